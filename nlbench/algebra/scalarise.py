@@ -1,0 +1,252 @@
+"""Small arrays taken apart: a jax function of arrays becomes scalar arithmetic on their elements.
+
+`scalarise` walks a jaxpr with every array held as an integer array of node numbers; a node is a scalar, either a Python
+number known at trace time or a 0-d jax array. Stacking, indexing and slicing then cost nothing, known values fold,
+zeros vanish and equal subexpressions are formed once, so a function written with arrays depends, element by element,
+on just what it must. An operation without a rule is applied to whole arrays: right, and dense in its dependence.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import jax.extend.core
+import jax.numpy as jnp
+import numpy as np
+
+from nlbench.algebra.scalars import Scalar, add, is_known, multiply
+
+Nodes = np.ndarray  # node numbers, in the shape of the array they stand for
+
+ELEMENTWISE = frozenset(
+    "abs acos acosh and asin asinh atan atan2 atanh cbrt ceil clamp convert_element_type cos cosh digamma div eq erf "
+    "erf_inv erfc exp exp2 expm1 floor ge gt integer_pow is_finite le lgamma log log1p logistic lt max min ne "
+    "nextafter not or pow rem round rsqrt select_n sign sin sinh sqrt square tan tanh xor".split()
+)
+# Operations that only move elements, with the operands that hold data, not indices (None: all of them).
+MOVEMENT: dict[str, tuple[int, ...] | None] = {
+    "broadcast_in_dim": (0,),
+    "concatenate": None,
+    "copy": (0,),
+    "dynamic_slice": (0,),
+    "dynamic_update_slice": (0, 1),
+    "expand_dims": (0,),
+    "gather": (0,),
+    "pad": (0, 1),
+    "reshape": (0,),
+    "rev": (0,),
+    "scatter": (0, 2),
+    "slice": (0,),
+    "split": (0,),
+    "stack": None,
+    "tile": (0,),
+    "squeeze": (0,),
+    "transpose": (0,),
+    "unstack": (0,),
+}
+REDUCTIONS: dict[str, tuple[Callable[[Scalar, Scalar], Scalar], Scalar]] = {
+    "reduce_sum": (add, 0.0),
+    "reduce_prod": (multiply, 1.0),
+}
+ARITHMETIC: dict[str, Callable[..., Scalar]] = {
+    "add": add,
+    "add_any": add,
+    "sub": lambda a, b: (
+        a - b if not any(is_known(s) and s == 0 for s in (a, b)) else add(a, multiply(-1.0, b))
+    ),
+    "mul": multiply,
+    "neg": lambda a: multiply(-1.0, a),
+    "stop_gradient": lambda a: a,
+}
+CALLS = ("jaxpr", "call_jaxpr", "fun_jaxpr")
+
+
+def scalarise(
+    function: Callable, *arguments: Sequence[Scalar] | Scalar, dtype: Any
+) -> list[tuple[tuple, list]]:
+    """The outputs of a function, taken apart.
+
+    arguments: each a sequence of scalars standing for a vector of `dtype`, or one scalar.
+    Returns the shape and the list of elements, in C order, of each array leaf of what the function returns; an element
+    that is a Python number does not depend on any unknown argument.
+    """
+    walk = _Walk()
+    numbers = [
+        np.array([walk.node(s) for s in argument], int)
+        if isinstance(argument, (list, tuple))
+        else np.array(walk.node(argument))
+        for argument in arguments
+    ]
+    closed = jax.make_jaxpr(function)(*(jax.ShapeDtypeStruct(number.shape, dtype) for number in numbers))
+    outputs = walk.run(closed.jaxpr, closed.consts, numbers)
+    return [(output.shape, walk.scalars(output)) for output in outputs]
+
+
+class _Walk:
+    """One pass over a jaxpr: the nodes, and the operations that formed them."""
+
+    def __init__(self) -> None:
+        self.nodes: list[Scalar] = []
+        self.known: dict[Any, int] = {}
+        self.formed: dict[Any, int] = {}
+
+    def node(self, scalar: Scalar) -> int:
+        """The number of a scalar; equal known ones share it."""
+        key = (type(scalar), scalar, math.copysign(1, scalar)) if is_known(scalar) else id(scalar)
+        if key not in self.known:
+            self.known[key] = len(self.nodes)
+            self.nodes.append(scalar)
+        return self.known[key]
+
+    def scalars(self, nodes: Nodes) -> list[Scalar]:
+        """The elements of an array in C order."""
+        return [self.nodes[number] for number in nodes.reshape(-1)]
+
+    def all_known(self, nodes: Nodes) -> bool:
+        return all(map(is_known, self.scalars(nodes)))
+
+    def run(self, jaxpr: Any, consts: Sequence[Any], arguments: Sequence[Nodes]) -> list[Nodes]:
+        values: dict[Any, Nodes] = dict(zip(jaxpr.constvars, map(self.apart, consts), strict=True))
+        values.update(zip(jaxpr.invars, arguments, strict=True))
+
+        def read(atom: Any) -> Nodes:
+            return self.apart(atom.val) if isinstance(atom, jax.extend.core.Literal) else values[atom]
+
+        for equation in jaxpr.eqns:
+            outputs = self.apply(equation, [read(atom) for atom in equation.invars])
+            values.update(zip(equation.outvars, outputs, strict=True))
+        return [read(atom) for atom in jaxpr.outvars]
+
+    def apply(self, equation: Any, operands: list[Nodes]) -> list[Nodes]:
+        name, params = equation.primitive.name, equation.params
+        inner = next((params[key] for key in CALLS if key in params), None)
+        if inner is not None and name not in ("scan", "while", "cond"):
+            return self.run(getattr(inner, "jaxpr", inner), getattr(inner, "consts", ()), operands)
+        if name in ARITHMETIC:
+            return [self.each(name, ARITHMETIC[name], operands)]
+        if name in ELEMENTWISE:
+            return [self.each((name, str(params)), lambda *scalars: _bind(equation, scalars), operands)]
+        if name in REDUCTIONS:
+            return [self.reduced(name, operands[0], params["axes"])]
+        if name == "dot_general":
+            return [self.dot(*operands, params["dimension_numbers"])]
+        if name in MOVEMENT:
+            data = MOVEMENT[name] or range(len(operands))
+            if all(self.all_known(operand) for place, operand in enumerate(operands) if place not in data):
+                return self.moved(equation, operands, data)
+        return self.whole(equation, operands)
+
+    def operation(self, key: Any, function: Callable[..., Scalar], numbers: tuple[int, ...]) -> int:
+        """The node that an operation on nodes gives, formed once."""
+        if (key, numbers) not in self.formed:
+            self.formed[key, numbers] = self.node(function(*(self.nodes[number] for number in numbers)))
+        return self.formed[key, numbers]
+
+    def each(self, key: Any, function: Callable[..., Scalar], operands: Sequence[Nodes]) -> Nodes:
+        """An operation on each tuple of elements, operands broadcast against each other."""
+        shape = np.broadcast_shapes(*(operand.shape for operand in operands))
+        rows = zip(
+            *(np.broadcast_to(operand, shape).reshape(-1).tolist() for operand in operands), strict=True
+        )
+        return np.array([self.operation(key, function, numbers) for numbers in rows], int).reshape(shape)
+
+    def reduced(self, name: str, operand: Nodes, axes: Sequence[int]) -> Nodes:
+        function, start = REDUCTIONS[name]
+        kept = [axis for axis in range(operand.ndim) if axis not in axes]
+        rows = np.transpose(operand, (*kept, *axes)).reshape([operand.shape[axis] for axis in kept] + [-1])
+        total = np.full(rows.shape[:-1], self.node(start))
+        for place in range(rows.shape[-1]):
+            total = self.each(name, function, [total, rows[..., place]])
+        return total
+
+    def dot(self, a: Nodes, b: Nodes, dimensions: Any) -> Nodes:
+        (contract_a, contract_b), (batch_a, batch_b) = dimensions
+        free_a = [axis for axis in range(a.ndim) if axis not in (*contract_a, *batch_a)]
+        free_b = [axis for axis in range(b.ndim) if axis not in (*contract_b, *batch_b)]
+        a = np.transpose(a, (*batch_a, *free_a, *contract_a))
+        b = np.transpose(b, (*batch_b, *free_b, *contract_b))
+        batch, summed = len(batch_a), a.ndim - len(contract_a)
+        a = a.reshape(a.shape[:summed] + (1,) * len(free_b) + a.shape[summed:])
+        b = b.reshape(b.shape[:batch] + (1,) * len(free_a) + b.shape[batch:])
+        products = self.each("mul", multiply, np.broadcast_arrays(a, b))
+        return self.reduced("reduce_sum", products, range(products.ndim - len(contract_a), products.ndim))
+
+    def moved(self, equation: Any, operands: Sequence[Nodes], data: Sequence[int]) -> list[Nodes]:
+        """Where the elements go: the node numbers themselves are moved; a fill out of bounds is zero."""
+        zero = self.node(0.0)
+        params = equation.params | ({"fill_value": 0} if "fill_value" in equation.params else {})
+        with jax.ensure_compile_time_eval():
+            numbers = [
+                (operand + 1).astype(np.int32) if place in data else self.together(operand, atom.aval)
+                for place, (operand, atom) in enumerate(zip(operands, equation.invars, strict=True))
+            ]
+            places = [
+                np.asarray(result) - 1 for result in _listed(equation.primitive.bind(*numbers, **params))
+            ]
+        return [np.where(place < 0, zero, place) for place in places]
+
+    def whole(self, equation: Any, operands: Sequence[Nodes]) -> list[Nodes]:
+        """An operation without a rule, applied to whole arrays."""
+        avals = [atom.aval for atom in equation.invars]
+        arrays = [self.together(operand, aval) for operand, aval in zip(operands, avals, strict=True)]
+        if all(map(self.all_known, operands)):
+            with jax.ensure_compile_time_eval():
+                return [self.apart(r) for r in _listed(equation.primitive.bind(*arrays, **equation.params))]
+        return [self.apart(r) for r in _listed(equation.primitive.bind(*arrays, **equation.params))]
+
+    def apart(self, array: Any) -> Nodes:
+        """An array as node numbers; a concrete one gives Python numbers."""
+        if isinstance(array, jax.core.Tracer):
+            elements = [array[index] for index in np.ndindex(array.shape)]
+        else:
+            elements = np.asarray(array).reshape(-1).tolist()
+        return np.array([self.node(element) for element in elements], int).reshape(np.shape(array))
+
+    def together(self, nodes: Nodes, aval: Any) -> Any:
+        """The array of the nodes."""
+        if self.all_known(nodes):
+            return np.array(self.scalars(nodes), aval.dtype).reshape(nodes.shape)
+        return jnp.stack([_array(s, aval.dtype) for s in self.scalars(nodes)]).reshape(nodes.shape)
+
+
+def _bind(equation: Any, scalars: Sequence[Scalar]) -> Scalar:
+    """One elementwise operation on scalars, folded where it can be."""
+    folded = _folded(equation.primitive.name, scalars, equation.params)
+    if folded is not None:
+        return folded
+    arrays = [_array(s, atom.aval.dtype) for s, atom in zip(scalars, equation.invars, strict=True)]
+    if not all(map(is_known, scalars)):
+        return equation.primitive.bind(*arrays, **equation.params)
+    with jax.ensure_compile_time_eval():
+        return equation.primitive.bind(*arrays, **equation.params).item()
+
+
+def _folded(name: str, scalars: Sequence[Scalar], params: dict) -> Scalar | None:
+    """The result where it needs less than the operation; None otherwise."""
+    first, known = scalars[0], is_known(scalars[0])
+    if name == "convert_element_type" and not known and first.dtype == params["new_dtype"]:
+        return first
+    if name == "div" and known and first == 0:
+        return 0.0
+    if name == "div" and not known and is_known(scalars[1]) and math.frexp(scalars[1])[0] in (-0.5, 0.5):
+        return multiply(1.0 / scalars[1], first)  # a power of two, so exact
+    if name == "integer_pow" and not known and params["y"] in (1, 2, 3):
+        return {1: first, 2: first * first, 3: first * first * first}[params["y"]]
+    if name == "square" and not known:
+        return first * first
+    if name == "select_n" and known:
+        return scalars[1 + int(first)]
+    if name == "select_n" and all(is_known(case) and case == scalars[1] for case in scalars[1:]):
+        return scalars[1]
+    return None
+
+
+def _array(scalar: Scalar, dtype: Any) -> Any:
+    return np.asarray(scalar, dtype) if is_known(scalar) else jnp.asarray(scalar, dtype)
+
+
+def _listed(results: Any) -> Sequence[Any]:
+    return results if isinstance(results, (list, tuple)) else [results]

@@ -1,0 +1,45 @@
+"""The engine: blocks of trajectories through truth, filters and statistics, on all cores, resumable at any moment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = ["plan", "replay", "run"]
+
+
+def run(experiment: Any, out: Any = None, progress: Any = None) -> Any:
+    """Run an experiment, or go on with one that was stopped, and return its `Results`.
+
+    experiment: an `Experiment`, a path of an experiment file, or a dict with the keys of one.
+    out: folder of results (default "results"). progress: called with (runs done, runs in all).
+    Raises `ConfigError` before anything is computed, `LockedError` where another process runs the same experiment,
+    `EnvironmentFault` for disk and memory, `Interrupted` after Ctrl-C with everything so far saved.
+    """
+    from nlbench.engine.driver import run
+
+    return run(_experiment(experiment), "results" if out is None else out, progress)
+
+
+def plan(experiment: Any) -> dict[str, Any]:
+    """What a run would cost: blocks, steps, seconds, bytes of memory and of disk."""
+    from nlbench.engine.estimate import plan
+
+    return plan(_experiment(experiment))
+
+
+def replay(experiment: Any, label: str, trajectory: int) -> Any:
+    """One trajectory of one filter in full, as a DataFrame, recomputed with its whole block."""
+    from nlbench.engine.trace import replay
+
+    return replay(_experiment(experiment), label, trajectory)
+
+
+def _experiment(given: Any) -> Any:
+    from nlbench import config, runtime
+
+    if isinstance(given, config.Experiment):
+        experiment = given
+    else:
+        experiment = config.from_dict(given) if isinstance(given, dict) else config.load(given)
+    runtime.configure(precision=experiment.engine.precision)
+    return experiment

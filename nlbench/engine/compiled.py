@@ -1,0 +1,66 @@
+"""The compiled block computation, made once and called from every thread."""
+
+from __future__ import annotations
+
+import os
+import time
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import numpy as np
+
+from nlbench.engine.block import View, chunk_sums, make_chunk, words
+
+if TYPE_CHECKING:
+    from nlbench.engine.problem import Problem
+
+CAPACITY = 64  # blocks of a call, unless the experiment says otherwise
+
+
+class Compiled(NamedTuple):
+    """A compiled `chunk_sums`: call it with chunks of the same capacity."""
+
+    executable: Any
+    problem: Problem
+    seed: tuple[Any, Any]
+    capacity: int
+    seconds: float
+
+    def __call__(self, first_block: int, count: int, runs: int) -> dict[str, np.ndarray]:
+        """Sums of blocks first_block ... first_block + count - 1, on the host."""
+        chunk = make_chunk(self.problem, first_block, count, self.capacity, runs)
+        sums, _ = self.executable(self.seed, chunk)
+        return {name: np.asarray(value)[:count] for name, value in sums.items()}
+
+    def view(self, trajectory: int) -> View:
+        """One trajectory in full, computed with its block by the same executable."""
+        block, lane = divmod(trajectory, self.problem.block)
+        chunk = make_chunk(self.problem, block, 1, self.capacity, trajectory + 1, (0, lane))
+        return jax.tree.map(np.asarray, self.executable(self.seed, chunk)[1])
+
+    def memory(self) -> int:
+        """Bytes that a call takes for its inputs, outputs and temporaries."""
+        needs = self.executable.memory_analysis()
+        return needs.argument_size_in_bytes + needs.output_size_in_bytes + needs.temp_size_in_bytes
+
+
+def compile_chunks(problem: Problem, seed: int, capacity: int | None) -> Compiled:
+    """Compile for chunks of `capacity` blocks; the persistent cache keeps the result for the next process."""
+    use_cache()
+    capacity = capacity or CAPACITY
+    seed_words = words(seed)
+    example = make_chunk(problem, 0, capacity, capacity, capacity * problem.block)
+    begun = time.perf_counter()
+    executable = jax.jit(partial(chunk_sums, problem)).lower(seed_words, example).compile()
+    return Compiled(executable, problem, seed_words, capacity, time.perf_counter() - begun)
+
+
+def use_cache() -> None:
+    """Keep compiled programs on disk, in $NLBENCH_CACHE or the user's cache folder."""
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    folder = os.environ.get("NLBENCH_CACHE") or Path(base) / "nlbench" / "xla"
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)

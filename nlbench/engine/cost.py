@@ -1,0 +1,99 @@
+"""What each filter costs: time per trajectory and step, operations, time to compile."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from nlbench.engine.block import make_chunk, trajectories, words
+from nlbench.engine.follow import follow
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from nlbench.engine.problem import Problem, Runner
+
+BLOCKS = 16
+ROUNDS = 7
+ARITHMETIC = frozenset(
+    "add sub mul div neg integer_pow pow sqrt rsqrt exp log log1p expm1 sin cos tan tanh atan2 max min square abs".split()
+)
+
+
+def cost_table(problem: Problem, seed: int) -> pd.DataFrame:
+    """`filter, ns_per_step, compile_seconds, operations_per_step, operations_per_update`.
+
+    ns_per_step: one core, updates included, for one trajectory and one integration step; medians of interleaved
+    rounds on the measurements of the first blocks. operations: scalar arithmetic before XLA shares any of it.
+    """
+    import pandas as pd
+
+    chunk = make_chunk(problem, 0, BLOCKS, BLOCKS, BLOCKS * problem.block)
+    measurements = jax.jit(lambda lanes: jax.lax.map(partial(_measurements, problem, words(seed)), lanes))(
+        chunk.lanes
+    )
+    programs, compile_seconds = [], []
+    for runner in problem.runners:
+        begun = time.perf_counter()
+        programs.append(jax.jit(partial(_alone, problem, runner)).lower(measurements).compile())
+        compile_seconds.append(time.perf_counter() - begun)
+    rounds = [[_seconds(program, measurements) for program in programs] for _ in range(ROUNDS)]
+    steps = problem.schedule.segments * problem.schedule.segment_steps * problem.block * BLOCKS
+    counted = [operations(problem, runner) for runner in problem.runners]
+    return pd.DataFrame(
+        {
+            "filter": [runner.label for runner in problem.runners],
+            "ns_per_step": [1e9 * statistics.median(times) / steps for times in zip(*rounds, strict=True)],
+            "compile_seconds": compile_seconds,
+            "operations_per_step": [step for step, _ in counted],
+            "operations_per_update": [update for _, update in counted],
+        }
+    )
+
+
+def _measurements(problem: Problem, seed: tuple[Any, Any], lanes: Any) -> Any:
+    return trajectories(problem, seed, lanes)[1]
+
+
+def _alone(problem: Problem, runner: Runner, measurements: Any) -> Any:
+    """One filter on given measurements (B, M, m, L); a sum, so that nothing is left out."""
+
+    def block(y: Any) -> Any:
+        return jnp.sum(follow(runner, problem.schedule, y, problem.block).components, axis=(0, 1))
+
+    return jax.lax.map(block, measurements)
+
+
+def _seconds(program: Any, measurements: Any) -> float:
+    begun = time.perf_counter()
+    jax.block_until_ready(program(measurements))
+    return time.perf_counter() - begun
+
+
+def operations(problem: Problem, runner: Runner) -> tuple[int, int]:
+    """Arithmetic operations of one integration step and of one update, of one trajectory."""
+    filter = runner.filter
+    state = filter.init(runner.initial)
+    y = jnp.zeros(problem.truth.measurements)
+    step = jax.make_jaxpr(lambda state: filter.integrate(state, 0.0, runner.step, 1))(state)
+    update = jax.make_jaxpr(lambda state, y: filter.update(state, 0.0, y)[0])(state, y)
+    return _count(step.jaxpr), _count(update.jaxpr)
+
+
+def _count(jaxpr: Any) -> int:
+    total = 0
+    for equation in jaxpr.eqns:
+        inner = [
+            value for value in equation.params.values() if hasattr(value, "jaxpr") or hasattr(value, "eqns")
+        ]
+        repeats = equation.params.get("length", 1) if equation.primitive.name == "scan" else 1
+        total += repeats * sum(_count(getattr(each, "jaxpr", each)) for each in inner)
+        if equation.primitive.name in ARITHMETIC:
+            total += int(np.prod(equation.outvars[0].aval.shape))
+    return total

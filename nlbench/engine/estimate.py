@@ -1,0 +1,45 @@
+"""What a run would cost, from its compiled program and a short calibration."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+from nlbench import runtime
+from nlbench.engine.compiled import compile_chunks
+from nlbench.engine.problem import make
+from nlbench.statistics.totals import Totals
+
+if TYPE_CHECKING:
+    from nlbench.config import Experiment
+
+CALIBRATION_BLOCKS = 16
+
+
+def plan(experiment: Experiment) -> dict[str, Any]:
+    """Runs, blocks, steps, filters; seconds to compile and to run; bytes of memory and disk."""
+    problem = make(experiment)
+    compiled = compile_chunks(problem, experiment.monte_carlo.seed, experiment.engine.chunk)
+    runs, threads = experiment.monte_carlo.runs, experiment.engine.threads or runtime.threads()
+    blocks = -(-runs // problem.block)
+    count = min(CALIBRATION_BLOCKS, compiled.capacity)
+    totals, times = Totals(problem.layout), []
+    for turn in range(3):
+        begun = time.perf_counter()
+        sums = compiled(turn * count, count, (turn + 1) * count * problem.block)
+        for place in range(count):
+            totals.add(turn * count + place, {name: value[place] for name, value in sums.items()})
+        times.append(time.perf_counter() - begun)
+    state = sum(array.nbytes for array in totals.state().values())
+    return {
+        "runs": runs,
+        "blocks": blocks,
+        "steps_per_run": problem.schedule.segments * problem.schedule.segment_steps,
+        "measurements_per_run": problem.schedule.measurements,
+        "filters": list(experiment.labels),
+        "threads": threads,
+        "compile_seconds": compiled.seconds,
+        "run_seconds": min(times) / count * blocks / threads,
+        "memory_bytes": compiled.memory() * threads + state,
+        "disk_bytes": 2 * state,
+    }

@@ -1,0 +1,75 @@
+"""One filter over one block: moments at the output times, as unique components with the lanes last."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from nlbench.moments.moments import Components
+
+if TYPE_CHECKING:
+    from nlbench.engine.problem import Runner
+    from nlbench.schedule import Schedule
+
+
+class Followed(NamedTuple):
+    """Unique components of mean, covariance and third moment in one axis, (T, k, L), the start first; and how many
+    updates the guard replaced, (L,)."""
+
+    components: Any
+    guarded: Any
+
+
+def follow(runner: Runner, schedule: Schedule, measurements: Any, lanes: int) -> Followed:
+    """The filter along the measurements (M, m, L) of a block."""
+    filter = runner.filter
+    start = jax.tree.map(
+        lambda leaf: jnp.broadcast_to(jnp.asarray(leaf)[..., None], (*jnp.shape(leaf), lanes)),
+        filter.init(runner.initial),
+    )
+    span = runner.step * runner.steps
+
+    def segment(number: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
+        state, guarded = carry
+        t = number * span
+        state = over_lanes(lambda state: filter.integrate(state, t, runner.step, runner.steps))(state)
+        if schedule.measured_every == 0:
+            return state, guarded
+        if schedule.measured_every == 1:
+            return measure(number, (state, guarded))
+        due = (number + 1) % schedule.measured_every == 0
+        return jax.lax.cond(due, measure, lambda _, carry: carry, number, (state, guarded))
+
+    def measure(number: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
+        state, guarded = carry
+        y = measurements[(number + 1) // schedule.measured_every - 1]
+        t = (number + 1) * span
+        state, info = over_lanes(lambda state, y: filter.update(state, t, y))(state, y)
+        return state, guarded + info.guarded
+
+    def to_output(carry: tuple[Any, Any], output: Any) -> tuple[tuple[Any, Any], Any]:
+        first = output * schedule.output_every
+        if schedule.output_every == 1:
+            carry = segment(first, carry)
+        else:
+            carry = jax.lax.fori_loop(first, first + schedule.output_every, segment, carry)
+        return carry, emitted(carry[0])
+
+    def emitted(state: Any) -> Any:
+        return over_lanes(lambda state: _joined(filter.components(state)))(state)
+
+    carry = (start, jnp.zeros(lanes, int))
+    (_, guarded), outputs = jax.lax.scan(to_output, carry, jnp.arange(schedule.outputs))
+    return Followed(jnp.concatenate([emitted(start)[None], outputs]), guarded)
+
+
+def over_lanes(function: Any) -> Any:
+    """A function of one trajectory for a block, with the lanes as the last axis."""
+    return jax.vmap(function, in_axes=-1, out_axes=-1)
+
+
+def _joined(components: Components) -> Any:
+    carried = [tensor for tensor in components[:3] if tensor is not None]
+    return jnp.stack([jnp.asarray(entry) for tensor in carried for entry in tensor])

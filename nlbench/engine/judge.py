@@ -1,0 +1,82 @@
+"""Errors of a filter against the truth, and its own idea of them: the tracks that the statistics take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from nlbench.algebra import Tensor, einsum, expand, inverse, positive_definite, zeros
+from nlbench.engine.follow import over_lanes
+from nlbench.moments.moments import Components
+from nlbench.updates.posterior import through_gain
+
+if TYPE_CHECKING:
+    from nlbench.statistics.layout import Layout
+    from nlbench.systems.system import System
+
+
+class Judged(NamedTuple):
+    """Of one filter: errors (T, C, L), unique components of the estimated covariance (T, C2, L) and third moment
+    (T, C3, L) of the errors, joint NEES (T, L) and whether diverged (T, L)."""
+
+    error: Any
+    cov: Any
+    third: Any
+    nees: Any
+    diverged: Any
+
+
+def judge(system: System, layout: Layout, states: Any, components: Any) -> Judged:
+    """Compare the true states (T, n, L) with the moments (T, k, L) that a filter gave at the same times."""
+    judged = jax.vmap(over_lanes(lambda x, given: _one(system, x, given)))(states, components)
+    return judged._replace(diverged=_lasting(system, layout, judged.diverged))
+
+
+def _one(system: System, x: Any, given: Any) -> Judged:
+    """One trajectory at one time: states (n,), components (k,)."""
+    mean, cov, third, _ = _parted(given, system.states)
+    error, cov, third = _errors(system, x, mean, cov, third)
+    distance = einsum("i,i->", einsum("ij,j->i", inverse(cov), error), error)[()]
+    errors = error.to_array()
+    lost = ~jnp.isfinite(errors).all()
+    if system.diverged is not None:
+        lost = lost | system.diverged(errors)
+    return Judged(
+        errors,
+        jnp.stack(list(cov)),
+        jnp.stack([jnp.asarray(entry, errors.dtype) for entry in third]),
+        jnp.where(positive_definite(cov), distance, jnp.nan),
+        lost,
+    )
+
+
+def _parted(given: Any, n: int) -> Components:
+    """The components that `follow` joined; a filter without third moments has zero ones."""
+    entries: Iterator[Any] = iter(given)
+    mean, cov = (Tensor.symmetric(n, order, lambda _: next(entries)) for order in (1, 2))
+    carried = given.shape[0] > n + n * (n + 1) // 2
+    third = Tensor.symmetric(n, 3, lambda _: next(entries)) if carried else zeros(n, 3)
+    return Components(mean, cov, third)
+
+
+def _errors(
+    system: System, x: Any, mean: Tensor, cov: Tensor, third: Tensor
+) -> tuple[Tensor, Tensor, Tensor]:
+    """The error and its estimated moments; through the Jacobian where the system has its own errors."""
+    if system.error is None:
+        return Tensor.from_array(x, ((0,),)) - mean, cov, third
+    own = system.error
+    about = expand(lambda t, m: own(x, m), 0.0, list(mean), 1)
+    J = -about.first
+    return about.value, through_gain(J, cov), through_gain(J, third)
+
+
+def _lasting(system: System, layout: Layout, diverged: Any) -> Any:
+    """Where the rule says so, a run that has diverged at a report time stays diverged."""
+    if not system.diverged_stays:
+        return diverged
+    reported = jnp.zeros(len(layout.times), bool).at[jnp.asarray(layout.reports)].set(True)
+    return diverged | (jnp.cumsum(diverged & reported[:, None], axis=0) > 0)

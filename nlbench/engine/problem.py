@@ -1,0 +1,107 @@
+"""From a validated experiment to what is computed: the true system, the bound filters, the schedule, the layout."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from nlbench import filters, schedule, systems
+from nlbench.errors import ConfigError
+from nlbench.moments.moments import Moments
+from nlbench.statistics.layout import Layout
+from nlbench.systems.system import Coordinate, Sets, System
+
+if TYPE_CHECKING:
+    from nlbench.config import Experiment, FilterSpec
+    from nlbench.filters.filter import Filter
+    from nlbench.schedule import Schedule
+
+
+class Runner(NamedTuple):
+    """A filter of the experiment: the moments it starts from, and its steps in a segment, of length `step`."""
+
+    label: str
+    filter: Filter
+    initial: Moments
+    step: float
+    steps: int
+
+
+class Problem(NamedTuple):
+    """Everything that a block's computation depends on, apart from the seed."""
+
+    truth: System
+    runners: tuple[Runner, ...]
+    schedule: Schedule
+    layout: Layout
+    block: int
+
+    @property
+    def set_size(self) -> int:
+        """Number of trajectories whose initial states are drawn together."""
+        return self.truth.sample.size if isinstance(self.truth.sample, Sets) else 1
+
+
+def make(experiment: Experiment) -> Problem:
+    """The problem that an experiment states. Raises `ConfigError` where model and data do not fit each other."""
+    name, parameters = experiment.system.name, experiment.system.parameters
+    truth = systems.build(name, **{**parameters, **experiment.truth})
+    times = schedule.make(experiment.time.end, experiment.time.step, experiment.time.output, truth.interval)
+    runners = [_runner(experiment, spec, times) for spec in experiment.filters]
+    if experiment.reference is not None:
+        runners.append(_bound(experiment.reference, experiment.reference, truth, {}, truth.initial, times))
+    for runner in runners:
+        model = runner.filter.system
+        if (model.states, model.measurements) != (truth.states, truth.measurements):
+            raise ConfigError(
+                f"{runner.label}: its model has {model.states} states and {model.measurements} measurements, "
+                f"the data {truth.states} and {truth.measurements}"
+            )
+    return Problem(truth, tuple(runners), times, _layout(experiment, truth), experiment.engine.block)
+
+
+def _runner(experiment: Experiment, spec: FilterSpec, times: Schedule) -> Runner:
+    system = systems.build(experiment.system.name, **{**experiment.system.parameters, **spec.model})
+    initial = _overridden(system.initial, {**experiment.initial, **spec.initial})
+    options = {**spec.options, "missing": False}
+    return _bound(spec.label, spec.name, system, options, initial, times)
+
+
+def _bound(label: str, name: str, system: System, options: dict, initial: Moments, times: Schedule) -> Runner:
+    if name == "exact":
+        options = {}
+    span = times.step * times.segment_steps
+    longest = options.get("step") or times.step
+    steps = max(1, math.ceil(span / longest - 1e-9))
+    return Runner(label, filters.build(name, system, **options), initial, span / steps, steps)
+
+
+def _overridden(initial: Moments, given: dict[str, Any]) -> Moments:
+    """Initial moments with those given in their place."""
+    changed = Moments(
+        given.get("mean", initial.mean), given.get("cov", initial.cov), initial.third, initial.fourth
+    )
+    n = len(initial.mean)
+    if np.shape(changed.mean) != (n,) or np.shape(changed.cov) != (n, n):
+        raise ConfigError(
+            f"initial: mean and cov have shapes {np.shape(changed.mean)} and {np.shape(changed.cov)}, "
+            f"the system needs ({n},) and ({n}, {n})"
+        )
+    return changed
+
+
+def _layout(experiment: Experiment, truth: System) -> Layout:
+    coordinates = truth.coordinates or tuple(Coordinate(f"x{i + 1}") for i in range(truth.states))
+    times, reports = experiment.layout_times()
+    return Layout(
+        filters=experiment.labels,
+        times=times,
+        reports=reports,
+        coordinates=tuple(coordinate.name for coordinate in coordinates),
+        units=tuple(coordinate.unit for coordinate in coordinates),
+        clip=truth.clip or (math.inf,) * len(coordinates),
+        norms=truth.norms,
+        keep_runs=experiment.monte_carlo.keep_runs,
+    )

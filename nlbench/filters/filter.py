@@ -1,0 +1,48 @@
+"""What a filter is: a record of pure functions of one trajectory, without a batch axis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from nlbench.systems.system import System
+
+
+class UpdateInfo(NamedTuple):
+    """What an update learned on its way.
+
+    innovation: (m,), y - h at the prior mean, zero where y is NaN. innovation_cov: (m, m).
+    log_likelihood: logarithm of the predictive density of the entries taken.
+    nu: 1 + nu is the ratio of the predictive density to the Gaussian one (0 for a Gaussian prior).
+    guarded: whether the guard replaced the update.
+    """
+
+    innovation: Any
+    innovation_cov: Any
+    log_likelihood: Any
+    nu: Any
+    guarded: Any
+
+
+class Filter(NamedTuple):
+    """A filter bound to a system. `state` is a pytree that only the filter's own functions look into.
+
+    init: (moments, key=None) -> state.
+    predict: (state, t0, t1, key=None) -> state.
+    update: (state, t, y, key=None) -> (state, UpdateInfo); NaN in y (m,) means that entry was not taken.
+    moments: state -> Moments, full arrays.
+    rates: (state, t, y=None) -> Moments, their time derivatives between measurements.
+    integrate: (state, t, h, count) -> state, `count` steps of h from t; what `predict` and the engine call.
+    components: state -> Components, the unique components of the moments.
+    """
+
+    name: str
+    system: System
+    init: Callable
+    predict: Callable
+    update: Callable
+    moments: Callable
+    rates: Callable
+    integrate: Callable
+    components: Callable

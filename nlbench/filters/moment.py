@@ -1,0 +1,115 @@
+"""Moment filters: moment equations of some order between measurements, an update at them, a limiter and a guard.
+
+Between measurements the moments follow `nlbench.moments.equations` (Culver 1969, (4.64)-(4.68)); at a measurement an
+update of `nlbench.updates` turns prior into posterior. The state is the moments' unique components. Cost per step
+O(n^(order + 1)), per update O(n^(order + 1)).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import jax.numpy as jnp
+
+from nlbench.algebra import Tensor, einsum, log_determinant, zeros
+from nlbench.filters.filter import Filter, UpdateInfo
+from nlbench.moments import integrate as integration
+from nlbench.moments.equations import fourth_moment_rate, rates
+from nlbench.moments.moments import Components, Moments, dense, to_components, to_full
+from nlbench.updates.guard import fallback, guarded
+from nlbench.updates.hermite3 import hermite3, sub1, sub2
+from nlbench.updates.hermite4 import hermite4
+from nlbench.updates.kalman import kalman
+from nlbench.updates.limiter import limited
+from nlbench.updates.measurement import gain, linearise
+
+if TYPE_CHECKING:
+    from nlbench.filters.catalogue import Options, Row
+    from nlbench.systems.system import System
+
+UPDATES: dict[str, Callable] = {
+    "kalman": kalman,
+    "hermite3": hermite3,
+    "sub1": sub1,
+    "sub2": sub2,
+    "hermite4": hermite4,
+}
+
+
+def build(name: str, row: Row, system: System, options: Options) -> Filter:
+    """The filter of a catalogue row, bound to a system."""
+    integrator = integration.build(**options.integrator.model_dump())
+
+    def integrate(state: Components, t: Any, h: Any, count: Any) -> Components:
+        return integrator.integrate(lambda t, y: dense(rates(system, row.order, t, y)), t, h, count, state)
+
+    def predict(state: Components, t0: Any, t1: Any, key: Any = None) -> Components:
+        h, count = steps_between(t0, t1, options.step or system.default_step)
+        return integrate(state, t0, h, count)
+
+    def state_rates(state: Components, t: Any, y: Any = None) -> Moments:
+        found = rates(system, row.order, t, state)
+        full = to_full(found._replace(fourth=None))
+        if found.fourth is None:
+            return full
+        return full._replace(fourth=fourth_moment_rate(state, found).to_array())
+
+    return Filter(
+        name=name,
+        system=system,
+        init=lambda moments, key=None: to_components(moments, row.order),
+        predict=predict,
+        update=partial(_update, system, row, options),
+        moments=to_full,
+        rates=state_rates,
+        integrate=integrate,
+        components=lambda state: state,
+    )
+
+
+def steps_between(t0: Any, t1: Any, longest: float | None) -> tuple[Any, Any]:
+    """Length and number of the equal steps from t0 to t1, none longer than `longest` (None: a tenth of the way)."""
+    span = t1 - t0
+    if longest is None:
+        return span / 10, 10
+    if isinstance(span, (int, float)):
+        count = max(1, math.ceil(span / longest - 1e-9))
+        return span / count, count
+    count = jnp.maximum(1, jnp.ceil(span / longest - 1e-9)).astype(int)
+    return span / count, count
+
+
+def _update(
+    system: System, row: Row, options: Options, state: Components, t: Any, y: Any, key: Any = None
+) -> tuple[Components, UpdateInfo]:
+    measurement = linearise(system, t, state, y, options.missing)
+    gained = gain(state.cov, measurement)
+    z = clipped = measurement.z
+    if options.limiter is not None:
+        clipped = limited(z, gained.S_z, options.limiter)
+        z = clipped if options.limiter_scope == "all" else z
+    posterior = UPDATES[row.update](state, gained, z, clipped)
+    moments, fired = posterior.moments, jnp.zeros((), bool)
+    if options.guard == "sub1" and row.update != "kalman":
+        prior = state if row.update == "hermite4" else state._replace(fourth=None)
+        moments, fired = guarded(posterior, fallback(prior, gained, z))
+    if row.order == 4 and moments.fourth is None:
+        moments = moments._replace(fourth=zeros(system.states, 4))
+    info = UpdateInfo(
+        innovation=measurement.z.to_array(),
+        innovation_cov=gained.S_z.to_array(),
+        log_likelihood=_log_density(measurement.z, gained.W, gained.S_z, measurement.taken)
+        + jnp.log1p(jnp.where(fired, 0.0, posterior.nu)),  # where the guard fires the density is Gaussian
+        nu=jnp.asarray(posterior.nu, float),
+        guarded=fired,
+    )
+    return dense(moments), info
+
+
+def _log_density(z: Tensor, W: Tensor, S_z: Tensor, entries: Any) -> Any:
+    """Logarithm of the normal density N(z; 0, S_z); entries not taken have z = 0 and unit variance."""
+    distance = einsum("r,r->", einsum("rs,s->r", W, z), z)[()]
+    return -0.5 * (distance + log_determinant(S_z) + entries * math.log(2 * math.pi))

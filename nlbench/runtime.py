@@ -1,0 +1,98 @@
+"""Settings of jax that nlbench wants: float64, and XLA options that only count before the backend starts."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Any
+
+# Wide vectors, and loops over blocks run as one kernel. The second is undocumented, so jaxlib is pinned to a tested
+# range and a test asserts its effect.
+XLA_OPTIONS = (
+    "--xla_cpu_prefer_vector_width=512",
+    "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1000000000",
+)
+_chosen: dict[str, Any] = {}
+
+
+def configure(precision: str = "float64", threads: int | None = None) -> None:
+    """Set jax's precision and XLA's options; call it before the first computation.
+
+    precision: "float64" or "float32". threads: of the engine; None means one for each core available.
+    A second call with the same precision does nothing. Raises `ConfigError` for another precision than chosen before.
+    """
+    from nlbench.errors import ConfigError
+
+    if precision not in ("float64", "float32"):
+        raise ConfigError(f"precision '{precision}' is neither float64 nor float32")
+    if _chosen.get("precision", precision) != precision:
+        raise ConfigError(
+            f"precision is {_chosen['precision']} in this process; start another for {precision}"
+        )
+    if not backend_started():
+        _set_options()
+    import jax
+
+    jax.config.update("jax_enable_x64", precision == "float64")
+    _chosen["precision"] = precision
+    if threads is not None:
+        _chosen["threads"] = threads
+
+
+def ensure_precision() -> None:
+    """float64, unless `configure` chose otherwise."""
+    if "precision" not in _chosen:
+        import jax
+
+        jax.config.update("jax_enable_x64", True)
+
+
+def threads() -> int:
+    """Threads of the engine: as configured, otherwise one for each core available to this process."""
+    return _chosen.get("threads") or len(os.sched_getaffinity(0))
+
+
+def backend_started() -> bool:
+    """Whether jax has started its backend, after which XLA ignores new options."""
+    if "jax" not in sys.modules:
+        return False
+    from jax._src import xla_bridge
+
+    return xla_bridge.backends_are_initialized()
+
+
+def _set_options() -> None:
+    present = os.environ.get("XLA_FLAGS", "")
+    missing = [option for option in XLA_OPTIONS if option.split("=")[0] not in present]
+    if missing:
+        os.environ["XLA_FLAGS"] = " ".join([present, *missing]).strip()
+
+
+def doctor() -> list[tuple[str, bool, str]]:
+    """What this machine offers, each with whether it is as nlbench wants it and a word on it."""
+    from importlib.metadata import version
+
+    import jax
+
+    from nlbench.effect import speedup_by_options
+
+    flags = os.environ.get("XLA_FLAGS", "")
+    present = all(option.split("=")[0] in flags for option in XLA_OPTIONS)
+    device = jax.devices()[0]
+    findings = [
+        ("python", sys.version_info >= (3, 11), sys.version.split()[0]),
+        *((name, True, version(name)) for name in ("jax", "jaxlib", "equinox", "diffrax")),
+        ("device", True, f"{len(jax.devices())} x {device.device_kind}"),
+        ("cores", True, f"{len(os.sched_getaffinity(0))} available to this process"),
+        ("precision", bool(jax.config.jax_enable_x64), "float64" if jax.config.jax_enable_x64 else "float32"),
+        (
+            "xla options",
+            present,
+            "set" if present else f"missing; jax started before nlbench: {flags or 'none set'}",
+        ),
+    ]
+    gain = speedup_by_options()
+    return [
+        *findings,
+        ("effect of xla options", gain >= 2.0, f"third-order filter {gain:.1f} times faster with them"),
+    ]
