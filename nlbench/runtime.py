@@ -66,33 +66,3 @@ def _set_options() -> None:
     missing = [option for option in XLA_OPTIONS if option.split("=")[0] not in present]
     if missing:
         os.environ["XLA_FLAGS"] = " ".join([present, *missing]).strip()
-
-
-def doctor() -> list[tuple[str, bool, str]]:
-    """What this machine offers, each with whether it is as nlbench wants it and a word on it."""
-    from importlib.metadata import version
-
-    import jax
-
-    from nlbench.effect import speedup_by_options
-
-    flags = os.environ.get("XLA_FLAGS", "")
-    present = all(option.split("=")[0] in flags for option in XLA_OPTIONS)
-    device = jax.devices()[0]
-    findings = [
-        ("python", sys.version_info >= (3, 11), sys.version.split()[0]),
-        *((name, True, version(name)) for name in ("jax", "jaxlib", "equinox", "diffrax")),
-        ("device", True, f"{len(jax.devices())} x {device.device_kind}"),
-        ("cores", True, f"{len(os.sched_getaffinity(0))} available to this process"),
-        ("precision", bool(jax.config.jax_enable_x64), "float64" if jax.config.jax_enable_x64 else "float32"),
-        (
-            "xla options",
-            present,
-            "set" if present else f"missing; jax started before nlbench: {flags or 'none set'}",
-        ),
-    ]
-    gain = speedup_by_options()
-    return [
-        *findings,
-        ("effect of xla options", gain >= 2.0, f"third-order filter {gain:.1f} times faster with them"),
-    ]

@@ -10,7 +10,9 @@ from itertools import permutations, product
 from nlbench.algebra.scalars import Scalar, add, is_known, multiply
 from nlbench.algebra.tensor import Groups, Index, Tensor, canonical_indices, sort_within
 
-Factors = tuple[tuple[str, Tensor], ...]  # each factor: its index letters, its tensor
+# Each factor: its index letters, its tensor, and the place of the first operand that is that very tensor, by which
+# factors are ordered: the same expression then is the same program, to the last bit, in every process.
+Factors = tuple[tuple[str, Tensor, int], ...]
 
 
 def einsum(subscripts: str, *operands: Tensor, sym: str = "") -> Tensor:
@@ -43,7 +45,8 @@ def _parse(subscripts: str, operands: Sequence[Tensor]) -> tuple[Factors, str]:
     letters = left.split(",")
     if [len(word) for word in letters] != [len(operand.shape) for operand in operands]:
         raise ValueError(f"{subscripts} does not fit tensors of shapes {[o.shape for o in operands]}")
-    return tuple(zip(letters, operands, strict=True)), output
+    places = [next(place for place, other in enumerate(operands) if other is operand) for operand in operands]
+    return tuple(zip(letters, operands, places, strict=True)), output
 
 
 def _permuted(factors: Factors, output: str) -> list[Factors]:
@@ -53,7 +56,8 @@ def _permuted(factors: Factors, output: str) -> list[Factors]:
 
 def _renamed(factors: Factors, names: dict[str, str]) -> Factors:
     return tuple(
-        ("".join(names.get(letter, letter) for letter in word), operand) for word, operand in factors
+        ("".join(names.get(letter, letter) for letter in word), tensor, place)
+        for word, tensor, place in factors
     )
 
 
@@ -61,17 +65,14 @@ def _signature(factors: Factors, output: str) -> tuple:
     """Equal for expressions that are equal whatever their tensors hold: symmetry, order and dummy names taken out."""
     dummies = _contracted(factors, output)
     forms = (
-        sorted(
-            (id(tensor), sort_within(tuple(word), tensor.symmetry))
-            for word, tensor in _renamed(factors, names)
-        )
+        sorted((place, sort_within(tuple(word), X.symmetry)) for word, X, place in _renamed(factors, names))
         for names in (dict(zip(dummies, order, strict=True)) for order in permutations(dummies))
     )
     return tuple(min(forms))
 
 
 def _contracted(factors: Factors, output: str) -> str:
-    return "".join(dict.fromkeys(letter for word, _ in factors for letter in word if letter not in output))
+    return "".join(dict.fromkeys(letter for word, *_ in factors for letter in word if letter not in output))
 
 
 def _symmetry(factors: Factors, output: str) -> Groups:
@@ -98,7 +99,7 @@ def _declared(sym: str, output: str) -> Groups:
 def _evaluate(expressions: Sequence[Factors], output: str, symmetry: Groups) -> Tensor:
     extents = {
         letter: size
-        for word, tensor in expressions[0]
+        for word, tensor, _ in expressions[0]
         for letter, size in zip(word, tensor.shape, strict=True)
     }
     shape = tuple(extents[letter] for letter in output)
@@ -113,7 +114,7 @@ def _evaluate(expressions: Sequence[Factors], output: str, symmetry: Groups) -> 
                 extents,
                 monomials,
             )
-        entries[index] = _sum(monomials, {id(tensor): tensor for _, tensor in expressions[0]})
+        entries[index] = _sum(monomials, {place: tensor for _, tensor, place in expressions[0]})
     return Tensor(shape, symmetry, entries)
 
 
@@ -124,11 +125,11 @@ def _collect(
     for values in product(*(range(extents[letter]) for letter in dummies)):
         where = fixed | dict(zip(dummies, values, strict=True))
         monomial: list[tuple[int, Index]] = []
-        for word, tensor in factors:
+        for word, tensor, place in factors:
             index = tensor.canonical(tuple(where[letter] for letter in word))
             if index not in tensor.entries:
                 break
-            monomial.append((id(tensor), index))
+            monomial.append((place, index))
         else:
             into[tuple(sorted(monomial))] += 1
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.extend.core import jaxpr_as_fun
 
 from nlbench.engine.follow import follow, over_lanes
 from nlbench.engine.judge import judge
@@ -79,8 +80,12 @@ def chunk_sums(problem: Problem, seed: tuple[Any, Any], chunk: Chunk) -> tuple[d
         tracks, view = block_tracks(problem, seed, lanes, chunk.watched_lane)
         return block_sums(tracks, mask, problem.layout), view
 
+    traced, (sums, view) = jax.make_jaxpr(one, return_shape=True)(np.int32(0))
+    traced_once = jaxpr_as_fun(traced)
+    structure = jax.tree.structure((sums, view))
+
     def step(number: Any, carry: tuple[dict[str, Any], View]) -> tuple[dict[str, Any], View]:
-        sums, view = one(number)
+        sums, view = jax.tree.unflatten(structure, traced_once(number))
         watched = number == chunk.watched_block
         return (
             jax.tree.map(lambda total, part: total.at[number].set(part), carry[0], sums),
@@ -88,11 +93,9 @@ def chunk_sums(problem: Problem, seed: tuple[Any, Any], chunk: Chunk) -> tuple[d
         )
 
     capacity = chunk.real.shape[0]
-    sums, view = jax.eval_shape(one, 0)
     empty = jax.tree.map(lambda leaf: jnp.zeros((capacity, *leaf.shape), leaf.dtype), sums)
-    return jax.lax.fori_loop(
-        0, chunk.count, step, (empty, jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), view))
-    )
+    unseen = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), view)
+    return jax.lax.fori_loop(0, chunk.count, step, (empty, unseen))
 
 
 def block_tracks(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import time
 from functools import partial
@@ -16,28 +17,30 @@ from nlbench.engine.block import View, chunk_sums, make_chunk, words
 if TYPE_CHECKING:
     from nlbench.engine.problem import Problem
 
-CAPACITY = 64  # blocks of a call, unless the experiment says otherwise
+CAPACITY = (
+    64  # blocks of a call at most; one size for all, since XLA may compile another one to other last bits
+)
 
 
 class Compiled(NamedTuple):
-    """A compiled `chunk_sums`: call it with chunks of the same capacity."""
+    """A compiled `chunk_sums` of at most `CAPACITY` blocks a call; `program` identifies what was compiled."""
 
     executable: Any
     problem: Problem
     seed: tuple[Any, Any]
-    capacity: int
     seconds: float
+    program: str
 
     def __call__(self, first_block: int, count: int, runs: int) -> dict[str, np.ndarray]:
         """Sums of blocks first_block ... first_block + count - 1, on the host."""
-        chunk = make_chunk(self.problem, first_block, count, self.capacity, runs)
+        chunk = make_chunk(self.problem, first_block, count, CAPACITY, runs)
         sums, _ = self.executable(self.seed, chunk)
         return {name: np.asarray(value)[:count] for name, value in sums.items()}
 
     def view(self, trajectory: int) -> View:
         """One trajectory in full, computed with its block by the same executable."""
         block, lane = divmod(trajectory, self.problem.block)
-        chunk = make_chunk(self.problem, block, 1, self.capacity, trajectory + 1, (0, lane))
+        chunk = make_chunk(self.problem, block, 1, CAPACITY, trajectory + 1, (0, lane))
         return jax.tree.map(np.asarray, self.executable(self.seed, chunk)[1])
 
     def memory(self) -> int:
@@ -46,15 +49,16 @@ class Compiled(NamedTuple):
         return needs.argument_size_in_bytes + needs.output_size_in_bytes + needs.temp_size_in_bytes
 
 
-def compile_chunks(problem: Problem, seed: int, capacity: int | None) -> Compiled:
-    """Compile for chunks of `capacity` blocks; the persistent cache keeps the result for the next process."""
+def compile_chunks(problem: Problem, seed: int) -> Compiled:
+    """Compile the block computation; the persistent cache keeps the result for the next process."""
     use_cache()
-    capacity = capacity or CAPACITY
     seed_words = words(seed)
-    example = make_chunk(problem, 0, capacity, capacity, capacity * problem.block)
+    example = make_chunk(problem, 0, CAPACITY, CAPACITY, CAPACITY * problem.block)
     begun = time.perf_counter()
-    executable = jax.jit(partial(chunk_sums, problem)).lower(seed_words, example).compile()
-    return Compiled(executable, problem, seed_words, capacity, time.perf_counter() - begun)
+    lowered = jax.jit(partial(chunk_sums, problem)).lower(seed_words, example)
+    program = hashlib.sha256(lowered.as_text().encode()).hexdigest()[:12]
+    executable = lowered.compile()
+    return Compiled(executable, problem, seed_words, time.perf_counter() - begun, program)
 
 
 def use_cache() -> None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import jax
 
 from nlbench import runtime
-from nlbench.engine.compiled import Compiled, compile_chunks
+from nlbench.engine.compiled import CAPACITY, Compiled, compile_chunks
 from nlbench.engine.cost import cost_table
 from nlbench.engine.interruption import stop_requests
 from nlbench.engine.problem import Problem, make
@@ -46,12 +46,14 @@ def run(experiment: Experiment, out: str | Path, progress: Progress | None = Non
             return Results(folder.path)
         folder.reopen()
         folder.write_experiment(experiment.resolved_yaml())
-        totals = _resumed(folder, problem.layout)
-        runs = max(runs, totals.runs)
         begun = time.perf_counter()
-        compiled = compile_chunks(problem, experiment.monte_carlo.seed, experiment.engine.chunk)
+        compiled = compile_chunks(problem, experiment.monte_carlo.seed)
+        totals = _resumed(folder, compiled)
+        runs = max(runs, totals.runs)
         threads = experiment.engine.threads or runtime.threads()
-        totals = _compute(compiled, folder, totals, runs, threads, progress)
+        totals = _compute(
+            compiled, folder, totals, runs, threads, experiment.engine.chunk or CAPACITY, progress
+        )
         seconds = time.perf_counter() - begun
         _write(folder, experiment, compiled, totals, seconds, threads)
     return Results(folder.path)
@@ -76,7 +78,7 @@ def _sound(folder: RunFolder) -> bool:
     return not faults
 
 
-def _resumed(folder: RunFolder, layout: Any) -> Totals:
+def _resumed(folder: RunFolder, compiled: Compiled) -> Totals:
     """Totals of the checkpoint, or fresh ones. Raises `EnvironmentFault` if other software made the checkpoint."""
     try:
         saved = folder.load_checkpoint()
@@ -84,19 +86,25 @@ def _resumed(folder: RunFolder, layout: Any) -> Totals:
         log.warning("%s; the run starts again", fault)
         saved = None
     if saved is None:
-        return Totals(layout)
+        return Totals(compiled.problem.layout)
     arrays, facts = saved
-    changed = differences(fingerprint(_device()), facts["fingerprint"])
+    changed = differences(_numerics(compiled), facts["fingerprint"])
     if changed:
         raise EnvironmentFault(
             f"{folder.path} was computed with other software or hardware ({'; '.join(changed)}), and mixing them "
             "would change digits: choose another folder with --out, or delete that one"
         )
-    return Totals.from_state(layout, arrays)
+    return Totals.from_state(compiled.problem.layout, arrays)
 
 
 def _compute(
-    compiled: Compiled, folder: RunFolder, totals: Totals, runs: int, threads: int, progress: Progress | None
+    compiled: Compiled,
+    folder: RunFolder,
+    totals: Totals,
+    runs: int,
+    threads: int,
+    chunk: int,
+    progress: Progress | None,
 ) -> Totals:
     """Totals of all runs. The checkpoint holds whole blocks; a last, partial one is added to a copy."""
     block = compiled.problem.block
@@ -105,15 +113,15 @@ def _compute(
     saved, saved_at = totals.blocks, time.monotonic()
     report(totals.runs, runs)
     with stop_requests() as stopped:
-        for first, sums in _in_order(compiled, totals.blocks, whole, runs, threads, stopped):
+        for first, sums in _in_order(compiled, totals.blocks, whole, runs, threads, chunk, stopped):
             for place in range(len(sums["total"])):
                 totals.add(first + place, {name: value[place] for name, value in sums.items()})
             report(totals.runs, runs)
             if time.monotonic() - saved_at > SECONDS_BETWEEN_CHECKPOINTS:
-                _checkpoint(folder, totals)
+                _checkpoint(folder, compiled, totals)
                 saved, saved_at = totals.blocks, time.monotonic()
         if totals.blocks != saved:
-            _checkpoint(folder, totals)
+            _checkpoint(folder, compiled, totals)
         if stopped() and totals.blocks < whole:
             raise Interrupted(
                 f"stopped after {totals.runs:,} of {runs:,} runs, which are saved; the same command goes on from there"
@@ -127,10 +135,16 @@ def _compute(
 
 
 def _in_order(
-    compiled: Compiled, first: int, last: int, runs: int, threads: int, stopped: Callable[[], bool]
+    compiled: Compiled,
+    first: int,
+    last: int,
+    runs: int,
+    threads: int,
+    chunk: int,
+    stopped: Callable[[], bool],
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     """Sums of blocks first ... last - 1 in order, computed by threads that run ahead; ends early when stopped."""
-    size = min(compiled.capacity, max(1, -(-(last - first) // (4 * threads))))
+    size = min(chunk, CAPACITY, max(1, -(-(last - first) // (4 * threads))))
     starts = iter(range(first, last, size))
     pending: deque[tuple[int, Future]] = deque()
     with ThreadPoolExecutor(threads) as pool:
@@ -143,8 +157,13 @@ def _in_order(
             yield start, future.result()
 
 
-def _checkpoint(folder: RunFolder, totals: Totals) -> None:
-    folder.save_checkpoint(totals.state(), fingerprint=fingerprint(_device()))
+def _checkpoint(folder: RunFolder, compiled: Compiled, totals: Totals) -> None:
+    folder.save_checkpoint(totals.state(), fingerprint=_numerics(compiled))
+
+
+def _numerics(compiled: Compiled) -> dict[str, str]:
+    """Everything that decides the last bits: software, hardware, settings, and the program itself."""
+    return {**fingerprint(_device()), "program": compiled.program}
 
 
 def _device() -> str:
@@ -177,7 +196,7 @@ def _write(
         versions=versions(),
         commit=commit(),
         device=_device(),
-        fingerprint=fingerprint(_device()),
+        fingerprint=_numerics(compiled),
         finished=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         seconds=round(seconds, 3),
         compile_seconds=round(compiled.seconds, 3),

@@ -19,10 +19,10 @@ CALIBRATION_BLOCKS = 16
 def plan(experiment: Experiment) -> dict[str, Any]:
     """Runs, blocks, steps, filters; seconds to compile and to run; bytes of memory and disk."""
     problem = make(experiment)
-    compiled = compile_chunks(problem, experiment.monte_carlo.seed, experiment.engine.chunk)
+    compiled = compile_chunks(problem, experiment.monte_carlo.seed)
     runs, threads = experiment.monte_carlo.runs, experiment.engine.threads or runtime.threads()
     blocks = -(-runs // problem.block)
-    count = min(CALIBRATION_BLOCKS, compiled.capacity)
+    count = CALIBRATION_BLOCKS
     totals, times = Totals(problem.layout), []
     for turn in range(3):
         begun = time.perf_counter()

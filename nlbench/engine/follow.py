@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from nlbench.moments.moments import Components
-
 if TYPE_CHECKING:
     from nlbench.engine.problem import Runner
     from nlbench.schedule import Schedule
@@ -58,7 +56,11 @@ def follow(runner: Runner, schedule: Schedule, measurements: Any, lanes: int) ->
         return carry, emitted(carry[0])
 
     def emitted(state: Any) -> Any:
-        return over_lanes(lambda state: _joined(filter.components(state)))(state)
+        components = over_lanes(filter.components)(state)
+        carried = [tensor for tensor in components[:3] if tensor is not None]
+        return jnp.stack(
+            [entry for tensor in carried for entry in tensor]
+        )  # inside the vmap it would be transposed
 
     carry = (start, jnp.zeros(lanes, int))
     (_, guarded), outputs = jax.lax.scan(to_output, carry, jnp.arange(schedule.outputs))
@@ -68,8 +70,3 @@ def follow(runner: Runner, schedule: Schedule, measurements: Any, lanes: int) ->
 def over_lanes(function: Any) -> Any:
     """A function of one trajectory for a block, with the lanes as the last axis."""
     return jax.vmap(function, in_axes=-1, out_axes=-1)
-
-
-def _joined(components: Components) -> Any:
-    carried = [tensor for tensor in components[:3] if tensor is not None]
-    return jnp.stack([jnp.asarray(entry) for tensor in carried for entry in tensor])

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import reduce
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from nlbench.algebra import Tensor, einsum, expand, inverse, positive_definite, zeros
-from nlbench.engine.follow import over_lanes
+from nlbench.algebra.scalarise import scalarise
 from nlbench.moments.moments import Components
 from nlbench.updates.posterior import through_gain
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 class Judged(NamedTuple):
     """Of one filter: errors (T, C, L), unique components of the estimated covariance (T, C2, L) and third moment
-    (T, C3, L) of the errors, joint NEES (T, L) and whether diverged (T, L)."""
+    (T, C3, L) of the errors, joint NEES (T, L) and whether diverged (T, L). Lists of scalars for one trajectory."""
 
     error: Any
     cov: Any
@@ -31,45 +31,53 @@ class Judged(NamedTuple):
 
 def judge(system: System, layout: Layout, states: Any, components: Any) -> Judged:
     """Compare the true states (T, n, L) with the moments (T, k, L) that a filter gave at the same times."""
-    judged = jax.vmap(over_lanes(lambda x, given: _one(system, x, given)))(states, components)
-    return judged._replace(diverged=_lasting(system, layout, judged.diverged))
-
-
-def _one(system: System, x: Any, given: Any) -> Judged:
-    """One trajectory at one time: states (n,), components (k,)."""
-    mean, cov, third, _ = _parted(given, system.states)
-    error, cov, third = _errors(system, x, mean, cov, third)
-    distance = einsum("i,i->", einsum("ij,j->i", inverse(cov), error), error)[()]
-    errors = error.to_array()
-    lost = ~jnp.isfinite(errors).all()
-    if system.diverged is not None:
-        lost = lost | system.diverged(errors)
+    each = jax.vmap(
+        jax.vmap(lambda x, given: _one(system, x, given))
+    )  # of scalars: arrays inside would be transposed
+    error, cov, third, nees, diverged = each(_apart(states), _apart(components))
     return Judged(
-        errors,
-        jnp.stack(list(cov)),
-        jnp.stack([jnp.asarray(entry, errors.dtype) for entry in third]),
-        jnp.where(positive_definite(cov), distance, jnp.nan),
-        lost,
+        jnp.stack(error, axis=1),
+        jnp.stack(cov, axis=1),
+        jnp.stack(third, axis=1),
+        nees,
+        _lasting(system, layout, diverged),
     )
 
 
-def _parted(given: Any, n: int) -> Components:
+def _apart(array: Any) -> list[Any]:
+    return [array[:, place] for place in range(array.shape[1])]
+
+
+def _one(system: System, x: list[Any], given: list[Any]) -> Judged:
+    """One trajectory at one time: n states, k components."""
+    mean, cov, third, _ = _parted(given, system.states)
+    error, cov, third = _errors(system, x, mean, cov, third)
+    distance = einsum("i,i->", einsum("ij,j->i", inverse(cov), error), error)[()]
+    lost = ~reduce(jnp.logical_and, map(jnp.isfinite, error))
+    if system.diverged is not None:
+        ((_, (rule,)),) = scalarise(system.diverged, list(error), dtype=float)
+        lost = lost | rule
+    nees = jnp.where(positive_definite(cov), distance, jnp.nan)
+    return Judged(*(list(map(jnp.asarray, tensor)) for tensor in (error, cov, third)), nees, lost)
+
+
+def _parted(given: list[Any], n: int) -> Components:
     """The components that `follow` joined; a filter without third moments has zero ones."""
-    entries: Iterator[Any] = iter(given)
+    entries = iter(given)
     mean, cov = (Tensor.symmetric(n, order, lambda _: next(entries)) for order in (1, 2))
-    carried = given.shape[0] > n + n * (n + 1) // 2
+    carried = len(given) > n + n * (n + 1) // 2
     third = Tensor.symmetric(n, 3, lambda _: next(entries)) if carried else zeros(n, 3)
     return Components(mean, cov, third)
 
 
 def _errors(
-    system: System, x: Any, mean: Tensor, cov: Tensor, third: Tensor
+    system: System, x: list[Any], mean: Tensor, cov: Tensor, third: Tensor
 ) -> tuple[Tensor, Tensor, Tensor]:
     """The error and its estimated moments; through the Jacobian where the system has its own errors."""
     if system.error is None:
-        return Tensor.from_array(x, ((0,),)) - mean, cov, third
+        return Tensor.symmetric(len(x), 1, lambda i: x[i[0]]) - mean, cov, third
     own = system.error
-    about = expand(lambda t, m: own(x, m), 0.0, list(mean), 1)
+    about = expand(lambda t, m: own(jnp.stack(x), m), 0.0, list(mean), 1)
     J = -about.first
     return about.value, through_gain(J, cov), through_gain(J, third)
 

@@ -29,7 +29,7 @@ def replay(experiment: Experiment, label: str, trajectory: int) -> pd.DataFrame:
     if not 0 <= trajectory < experiment.monte_carlo.runs:
         raise ConfigError(f"trajectory {trajectory} is not one of 0 ... {experiment.monte_carlo.runs - 1}")
     problem = make(experiment)
-    compiled = compile_chunks(problem, experiment.monte_carlo.seed, experiment.engine.chunk)
+    compiled = compile_chunks(problem, experiment.monte_carlo.seed)
     view = compiled.view(trajectory)
     number = experiment.labels.index(label)
     n = problem.truth.states
