@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from nlbench.errors import ConfigError
+from nlbench.suggestions import suggestion
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
     Model = TypeVar("Model", bound=BaseModel)
-
-
-def suggestion(name: str, names: Iterable[str]) -> str:
-    """`; did you mean 'x'?` when a known name is close, otherwise the known names."""
-    names = list(names)
-    close = get_close_matches(str(name), names, n=1)
-    return f"; did you mean '{close[0]}'?" if close else f"; known: {', '.join(names)}"
 
 
 def known(name: str, names: Iterable[str], what: str) -> str:

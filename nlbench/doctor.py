@@ -7,6 +7,7 @@ import sys
 
 from nlbench.runtime import XLA_OPTIONS
 
+
 def doctor() -> list[tuple[str, bool, str]]:
     """(what, whether it is as wanted, a word on it) for each finding; measures the effect of XLA's options."""
     from importlib.metadata import version
@@ -18,12 +19,13 @@ def doctor() -> list[tuple[str, bool, str]]:
     flags = os.environ.get("XLA_FLAGS", "")
     present = all(option.split("=")[0] in flags for option in XLA_OPTIONS)
     device = jax.devices()[0]
+    precision = jax.numpy.result_type(float).name
     findings = [
         ("python", sys.version_info >= (3, 11), sys.version.split()[0]),
         *((name, True, version(name)) for name in ("jax", "jaxlib", "equinox", "diffrax")),
         ("device", True, f"{len(jax.devices())} x {device.device_kind}"),
         ("cores", True, f"{len(os.sched_getaffinity(0))} available to this process"),
-        ("precision", bool(jax.config.jax_enable_x64), "float64" if jax.config.jax_enable_x64 else "float32"),
+        ("precision", precision == "float64", precision),
         (
             "xla options",
             present,

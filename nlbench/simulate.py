@@ -7,6 +7,7 @@ step is diffrax's Euler (Ito) on increments drawn beforehand.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import diffrax
@@ -101,8 +102,8 @@ class GivenIncrement(diffrax.AbstractPath):
     """A Brownian path of which only the increment over the step at hand is known."""
 
     increment: Any
-    t0: float = 0.0
-    t1: float = jnp.inf
+    t0 = 0.0
+    t1 = math.inf
 
     def evaluate(self, t0: Any, t1: Any = None, left: bool = True) -> Any:
         """The increment, whatever the interval."""
@@ -124,7 +125,7 @@ def _stochastic(system: System, schedule: Schedule, key: Any, start: Any) -> Any
         noise = diffrax.ControlTerm(
             lambda t, x, args: jnp.asarray(diffusion(t, x)), GivenIncrement(increment)
         )
-        terms = diffrax.MultiTerm(drift, noise)
+        terms: Any = diffrax.MultiTerm(drift, noise)
         return solver.step(terms, t, t + schedule.step, x, None, None, False)[0], None
 
     def segment(x: Any, given: tuple[Any, Any]) -> tuple[Any, Any]:

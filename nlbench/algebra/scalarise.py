@@ -132,7 +132,7 @@ class _Walk:
         if name in REDUCTIONS:
             return [self.reduced(name, operands[0], params["axes"])]
         if name == "dot_general":
-            return [self.dot(*operands, params["dimension_numbers"])]
+            return [self.dot(operands[0], operands[1], params["dimension_numbers"])]
         if name in MOVEMENT:
             data = MOVEMENT[name] or range(len(operands))
             if all(self.all_known(operand) for place, operand in enumerate(operands) if place not in data):

@@ -96,12 +96,12 @@ class Tensor:
             self.shape, self.symmetry, {index: function(entry) for index, entry in self.entries.items()}
         )
 
-    def dense(self, dtype: Any = None) -> Tensor:
-        """The same tensor with every unique component an array, as loops need that carry it."""
+    def dense(self) -> Tensor:
+        """The same tensor with every unique component an array of floats, as loops need that carry it."""
         filled = object.__new__(Tensor)
         filled.shape, filled.symmetry = self.shape, self.symmetry
         filled.entries = {
-            i: jnp.asarray(self[i], dtype) for i in canonical_indices(self.shape, self.symmetry)
+            i: jnp.asarray(self[i], float) for i in canonical_indices(self.shape, self.symmetry)
         }
         return filled
 
@@ -136,8 +136,8 @@ def zeros(n: int, order: int) -> Tensor:
     return Tensor((n,) * order, (tuple(range(order)),), {})
 
 
-def sort_within(index: Index, symmetry: Groups) -> Index:
-    """The index with its values sorted within each group of positions."""
+def sort_within(index: tuple, symmetry: Groups) -> tuple:
+    """The index (of numbers, or of letters) with its values sorted within each group of positions."""
     result = list(index)
     for group in symmetry:
         for position, value in zip(group, sorted(index[p] for p in group), strict=True):

@@ -31,7 +31,7 @@ class Compiled(NamedTuple):
     seconds: float
     program: str
 
-    def __call__(self, first_block: int, count: int, runs: int) -> dict[str, np.ndarray]:
+    def sums(self, first_block: int, count: int, runs: int) -> dict[str, np.ndarray]:
         """Sums of blocks first_block ... first_block + count - 1, on the host."""
         chunk = make_chunk(self.problem, first_block, count, CAPACITY, runs)
         sums, _ = self.executable(self.seed, chunk)

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 BLOCKS = 16
 ROUNDS = 7
 ARITHMETIC = frozenset(
-    "add sub mul div neg integer_pow pow sqrt rsqrt exp log log1p expm1 sin cos tan tanh atan2 max min square abs".split()
+    "abs add atan2 cos div exp expm1 integer_pow log log1p max min mul neg pow rsqrt sin sqrt square sub tan "
+    "tanh".split()
 )
 
 

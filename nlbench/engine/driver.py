@@ -71,8 +71,8 @@ def _sound(folder: RunFolder) -> bool:
     """Whether a finished run still is what it wrote."""
     try:
         faults = Results(folder.path).damaged()
-    except DamagedResults as fault:
-        faults = [str(fault)]
+    except DamagedResults as unreadable:
+        faults = [str(unreadable)]
     for fault in faults:
         log.warning("%s; it is computed anew", fault)
     return not faults
@@ -128,7 +128,7 @@ def _compute(
             )
     if rest:
         totals = totals.copy()
-        sums = compiled(whole, 1, runs)
+        sums = compiled.sums(whole, 1, runs)
         totals.add(whole, {name: value[0] for name, value in sums.items()})
         report(runs, runs)
     return totals
@@ -150,7 +150,7 @@ def _in_order(
     with ThreadPoolExecutor(threads) as pool:
         while True:
             while len(pending) < 2 * threads and not stopped() and (start := next(starts, None)) is not None:
-                pending.append((start, pool.submit(compiled, start, min(size, last - start), runs)))
+                pending.append((start, pool.submit(compiled.sums, start, min(size, last - start), runs)))
             if not pending:
                 return
             start, future = pending.popleft()

@@ -26,7 +26,7 @@ def plan(experiment: Experiment) -> dict[str, Any]:
     totals, times = Totals(problem.layout), []
     for turn in range(3):
         begun = time.perf_counter()
-        sums = compiled(turn * count, count, (turn + 1) * count * problem.block)
+        sums = compiled.sums(turn * count, count, (turn + 1) * count * problem.block)
         for place in range(count):
             totals.add(turn * count + place, {name: value[place] for name, value in sums.items()})
         times.append(time.perf_counter() - begun)

@@ -10,7 +10,6 @@ import jax.numpy as jnp
 
 from nlbench.algebra import Tensor, einsum, expand, inverse, positive_definite, zeros
 from nlbench.algebra.scalarise import scalarise
-from nlbench.moments.moments import Components
 from nlbench.updates.posterior import through_gain
 
 if TYPE_CHECKING:
@@ -50,7 +49,7 @@ def _apart(array: Any) -> list[Any]:
 
 def _one(system: System, x: list[Any], given: list[Any]) -> Judged:
     """One trajectory at one time: n states, k components."""
-    mean, cov, third, _ = _parted(given, system.states)
+    mean, cov, third = _parted(given, system.states)
     error, cov, third = _errors(system, x, mean, cov, third)
     distance = einsum("i,i->", einsum("ij,j->i", inverse(cov), error), error)[()]
     lost = ~reduce(jnp.logical_and, map(jnp.isfinite, error))
@@ -58,16 +57,17 @@ def _one(system: System, x: list[Any], given: list[Any]) -> Judged:
         ((_, (rule,)),) = scalarise(system.diverged, list(error), dtype=float)
         lost = lost | rule
     nees = jnp.where(positive_definite(cov), distance, jnp.nan)
-    return Judged(*(list(map(jnp.asarray, tensor)) for tensor in (error, cov, third)), nees, lost)
+    parts = [list(map(jnp.asarray, tensor)) for tensor in (error, cov, third)]
+    return Judged(parts[0], parts[1], parts[2], nees, lost)
 
 
-def _parted(given: list[Any], n: int) -> Components:
+def _parted(given: list[Any], n: int) -> tuple[Tensor, Tensor, Tensor]:
     """The components that `follow` joined; a filter without third moments has zero ones."""
     entries = iter(given)
     mean, cov = (Tensor.symmetric(n, order, lambda _: next(entries)) for order in (1, 2))
     carried = len(given) > n + n * (n + 1) // 2
     third = Tensor.symmetric(n, 3, lambda _: next(entries)) if carried else zeros(n, 3)
-    return Components(mean, cov, third)
+    return mean, cov, third
 
 
 def _errors(
@@ -78,6 +78,7 @@ def _errors(
         return Tensor.symmetric(len(x), 1, lambda i: x[i[0]]) - mean, cov, third
     own = system.error
     about = expand(lambda t, m: own(jnp.stack(x), m), 0.0, list(mean), 1)
+    assert about.first is not None
     J = -about.first
     return about.value, through_gain(J, cov), through_gain(J, third)
 

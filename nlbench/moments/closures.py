@@ -1,8 +1,8 @@
 """Higher central moments from lower ones: the quasi-moment (Hermite) and the cumulant closure.
 
-A closure of order K sets the coefficients k_n of order n > K to zero. With k4 = mu4 - 3{PP} (Culver 1969, (E.17)-(E.21),
-(E.20) and (E.21) corrected: the Hermite expansion is linear in the k_n, so the squares of S belong to the cumulant
-closure alone):
+A closure of order K sets the coefficients k_n of order n > K to zero. With k4 = mu4 - 3{PP} (Culver 1969,
+(E.17)-(E.21), of which (E.20) and (E.21) corrected: the Hermite expansion is linear in the k_n, so the squares of S
+belong to the cumulant closure alone):
   (1) mu4 = k4 + 3{P P}
   (2) mu5 = 10{P S}
   (3) mu6 = 15{P k4} + 15{P P P}            (+ 10{S S}, cumulant closure)

@@ -20,7 +20,7 @@ class Coordinate(NamedTuple):
 
 
 class Sets(NamedTuple):
-    """Initial states drawn together: `transform` maps the (size, n) standard normals of a set to its (size, n) states."""
+    """Initial states drawn together: `transform` maps a set's (size, n) standard normals to its (size, n) states."""
 
     size: int
     transform: Function

@@ -1,1 +1,1 @@
-"""Updates: a prior and a measurement give a posterior. Each is a function of the prior and the linearised measurement."""
+"""Updates: a prior and a linearised measurement give a posterior."""

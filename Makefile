@@ -1,0 +1,65 @@
+# Needs python3 (3.11 or later) and make; everything else is set up in .venv on the first call.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+INSTALL := $(PIP) install --require-hashes --only-binary :all: -r
+LOCK := uv pip compile --quiet --universal --generate-hashes --no-annotate --no-header --python-version 3.11
+EXPERIMENT ?= configs/quickstart.yaml
+OPTIONS ?=
+PYTEST_OPTIONS ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help run test check format lint types bench lock clean
+
+help:
+	@echo "make run     run $(EXPERIMENT) and write its report"
+	@echo "make test    run the tests"
+	@echo "make check   format, lint, types and tests"
+	@echo "make bench   run the benchmarks"
+	@echo "make lock    renew the lock files"
+	@echo "make clean   remove caches and .venv (results stay)"
+
+# The package itself is installed without its dependencies: those come, with hashes, from the lock file, which also
+# holds the build backend.
+$(VENV)/run.stamp: requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "nlbench needs Python 3.11 or later" >&2; exit 1; }
+	@echo "setting up $(VENV) ..."
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(INSTALL) requirements.lock
+	@$(PIP) install --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(VENV)/dev.stamp: requirements-dev.lock $(VENV)/run.stamp
+	@echo "adding the tools for tests ..."
+	@$(INSTALL) requirements-dev.lock
+	@touch $@
+
+run: $(VENV)/run.stamp
+	@$(BIN)/nlbench run $(EXPERIMENT) $(OPTIONS)
+
+test: $(VENV)/dev.stamp
+	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
+
+check: format lint types test
+
+format: $(VENV)/dev.stamp
+	@$(BIN)/ruff format --check .
+
+lint: $(VENV)/dev.stamp
+	@$(BIN)/ruff check .
+
+types: $(VENV)/dev.stamp
+	@$(BIN)/mypy
+
+bench: $(VENV)/dev.stamp
+	@$(BIN)/python -m benchmarks
+
+# Needs uv. hatchling and editables install the package itself. The second file holds all of the first, in the same versions.
+lock:
+	printf 'hatchling\neditables\n' | $(LOCK) pyproject.toml - -o requirements.lock
+	printf 'hatchling\neditables\n' | $(LOCK) pyproject.toml - --extra test --extra dev -c requirements.lock -o requirements-dev.lock
+
+clean:
+	rm -rf $(VENV) .hypothesis .mypy_cache .pytest_cache .ruff_cache build dist
+	find nlbench tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,119 @@
+"""The application: its commands, and how an error becomes a line on stderr and an exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from nlbench.cli import listing, output, preview, run, saved
+from nlbench.errors import EnvironmentFault, Interrupted, NlbenchError
+
+HELP = """Monte Carlo benchmarks of nonlinear filters.
+
+An experiment is a YAML file: a system, filters, and claims about them.
+Check it, see what it costs, run it:
+
+\b
+  nlbench validate configs/quickstart.yaml
+  nlbench plan     configs/quickstart.yaml
+  nlbench run      configs/quickstart.yaml
+"""
+EPILOG = """\b
+Exit codes:
+    0  ok                       5  disk, permission, memory or device
+    1  internal error           6  another run holds the folder
+    2  usage or configuration   7  nothing was compared
+    3  a gate failed          130  interrupted; the same command goes on
+    4  a filter failed, or diverged beyond the limit that the file sets
+"""
+
+
+class Commands(TyperGroup):
+    """A group whose commands end with the exit code of the error they raise, in plain words."""
+
+    def invoke(self, context: Any) -> Any:
+        try:
+            return super().invoke(context)
+        except NlbenchError as error:
+            output.complain(str(error))
+            raise typer.Exit(error.exit_code) from None
+        except KeyboardInterrupt:
+            output.complain("interrupted; the same command goes on from what was saved")
+            raise typer.Exit(Interrupted.exit_code) from None
+        except (typer.Exit, typer.Abort, BrokenPipeError):
+            raise
+        except MemoryError:
+            output.complain("out of memory; `nlbench plan CONFIG` says what an experiment needs")
+            raise typer.Exit(EnvironmentFault.exit_code) from None
+        except Exception as error:
+            if type(error).__module__.startswith(("typer", "click")) or os.environ.get("NLBENCH_DEBUG"):
+                raise
+            output.complain(internal(error))
+            raise typer.Exit(NlbenchError.exit_code) from None
+
+
+def internal(error: Exception) -> str:
+    """One line on an error that is not the user's, after its traceback was put aside."""
+    import tempfile
+    import traceback
+
+    said = " ".join(str(error).split())[:200]
+    text = f"internal error: {type(error).__name__}: {said}\n"
+    try:
+        with tempfile.NamedTemporaryFile("w", prefix="nlbench-", suffix=".txt", delete=False) as file:
+            file.write("".join(traceback.format_exception(error)))
+        return f"{text}the traceback is in {file.name}; nlbench --debug shows it at once"
+    except OSError:
+        return f"{text}nlbench --debug shows the traceback"
+
+
+app = typer.Typer(
+    cls=Commands,
+    help=HELP,
+    epilog=EPILOG,
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print(f"nlbench {version('nlbench')}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    if debug:
+        os.environ["NLBENCH_DEBUG"] = "1"
+
+
+app.command("run")(run.run)
+app.command("validate")(preview.validate)
+app.command("plan")(preview.plan)
+app.command("list")(listing.show)
+app.command("report")(saved.report)
+app.command("replay")(saved.replay)
+app.command("doctor")(preview.doctor)
+
+
+def main() -> None:
+    """Run the command line of this process."""
+    try:
+        app(prog_name="nlbench")
+    except KeyboardInterrupt:
+        sys.exit(Interrupted.exit_code)

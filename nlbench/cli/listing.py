@@ -1,0 +1,127 @@
+"""`nlbench list`: the systems, filters and experiments that there are."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from nlbench.cli import options, output
+from nlbench.errors import ConfigError
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+
+class What(StrEnum):
+    """What can be listed."""
+
+    systems = "systems"
+    filters = "filters"
+    experiments = "experiments"
+
+
+def show(
+    what: Annotated[What, typer.Argument(metavar="systems|filters|experiments", show_default=False)],
+    name: Annotated[
+        str | None, typer.Argument(help="One system or filter: its parameters.", show_default=False)
+    ] = None,
+    folder: Annotated[
+        Path, typer.Option("--configs", metavar="DIR", help="Folder of the experiments.")
+    ] = Path("configs"),
+    json: options.Json = False,
+) -> None:
+    """List systems, filters or experiments.
+
+    With a NAME, the parameters of that system or the options of that filter.
+    """
+    if name is not None:
+        _one(what, name, json)
+    elif what is What.experiments:
+        _experiments(folder, json)
+    else:
+        _all(what, json)
+
+
+def _registry(what: What) -> tuple[Any, Any, Any]:
+    """Names, one-line summary and pydantic model of the parameters."""
+    from nlbench import systems
+    from nlbench.filters import catalogue
+
+    if what is What.systems:
+        return systems.available(), systems.summary, systems.parameters
+    return catalogue.available(), catalogue.summary, catalogue.options
+
+
+def _all(what: What, json: bool) -> None:
+    names, summary, _ = _registry(what)
+    entries = [(name, summary(name)) for name in names]
+    if json:
+        output.as_json([{"name": name, "summary": text} for name, text in entries])
+        return
+    output.definitions(entries)
+    word = "parameters" if what is What.systems else "options"
+    output.next_step(f"nlbench list {what} {names[0]}", f"shows the {word} of one of them")
+
+
+def _one(what: What, name: str, json: bool) -> None:
+    from nlbench.suggestions import suggestion
+
+    if what is What.experiments:
+        raise ConfigError("list experiments takes no name; nlbench validate CONFIG shows one")
+    names, summary, model = _registry(what)
+    if name not in names:
+        raise ConfigError(f"unknown {what.removesuffix('s')} '{name}'{suggestion(name, names)}")
+    fields = list(_fields(model(name)))
+    if json:
+        output.as_json({"name": name, "summary": summary(name), "parameters": fields})
+        return
+    print(f"{name}: {summary(name)}\n")
+    output.definitions((each["name"], _described(each)) for each in fields)
+    entry = f"system: {{name: {name}}}" if what is What.systems else f"filters: [{name}]"
+    output.next_step(
+        f"write '{entry}' into an experiment file", "parameters go beside the name: {name: ..., key: value}"
+    )
+
+
+def _fields(model: type[BaseModel]) -> Any:
+    from nlbench.config.explain import expected, plain
+
+    for name, field in model.model_fields.items():
+        default = plain(field.get_default(call_default_factory=True))
+        takes = expected(field.annotation, tuple(field.metadata))
+        yield {"name": name, "default": default, "takes": takes, "description": field.description or ""}
+
+
+def _described(field: dict[str, Any]) -> str:
+    from nlbench.config.explain import found
+
+    default = field["default"]
+    shown = found(default) if not isinstance(default, (dict, list)) else str(default)
+    return "; ".join(part for part in (field["description"], field["takes"], f"default {shown}") if part)
+
+
+def _experiments(folder: Path, json: bool) -> None:
+    from nlbench.config import load
+
+    if not folder.is_dir():
+        raise ConfigError(f"no folder '{folder}' here; name one with --configs DIR")
+    entries = []
+    for path in sorted(folder.rglob("*.yaml")):
+        try:
+            entries.append({"file": str(path), "valid": True, "question": load(path).question})
+        except ConfigError as error:
+            count = len(error.problems)
+            text = f"not valid ({count} problem{'s' if count > 1 else ''}): nlbench validate {path}"
+            entries.append({"file": str(path), "valid": False, "question": text})
+    if json:
+        output.as_json(entries)
+        return
+    if not entries:
+        raise ConfigError(f"no experiment (*.yaml) in '{folder}'")
+    for each in entries:
+        print(each["file"])
+        output.definitions([("", str(each["question"]))], indent=0)
+    output.next_step(f"nlbench run {entries[0]['file']}", "runs the first")

@@ -1,0 +1,53 @@
+"""Arguments and options that several commands share, and the experiment that they state."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from nlbench.config import Experiment
+
+Config = Annotated[Path, typer.Argument(metavar="CONFIG", help="Experiment file (YAML).", show_default=False)]
+Runs = Annotated[
+    str | None,
+    typer.Option("--runs", metavar="N", help="Number of runs instead of the file's (1e5 will do)."),
+]
+Seed = Annotated[str | None, typer.Option("--seed", metavar="S", help="Seed instead of the file's.")]
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Any value of the file: --set time.step=0.01; repeatable."
+    ),
+]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of all results.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
+
+
+def experiment(config: Path, runs: str | None, seed: str | None, settings: list[str] | None) -> Experiment:
+    """The experiment in the file with the options of the command line put in. Raises `ConfigError`."""
+    from nlbench.config import Override, load
+
+    overrides: list[str | Override] = list(settings or [])
+    if runs is not None:
+        overrides.append(Override("monte_carlo.runs", runs, "--runs"))
+    if seed is not None:
+        overrides.append(Override("monte_carlo.seed", seed, "--seed"))
+    return load(config, overrides)
+
+
+def folder(experiment: Experiment, out: Path) -> Path:
+    """Where the results of the experiment lie."""
+    return out / experiment.experiment / experiment.hash12()
+
+
+def command(name: str, config: Path, settings: list[str] | None, *options: str) -> str:
+    """A command line that the user can paste: the same file and settings, another command."""
+    import shlex
+
+    words = ["nlbench", name, str(config), *options]
+    for each in settings or []:
+        words += ["--set", each]
+    return shlex.join(words)

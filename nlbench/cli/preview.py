@@ -1,0 +1,99 @@
+"""`nlbench validate`, `plan` and `doctor`: look before you run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from nlbench.cli import options, output
+from nlbench.errors import ConfigError, EnvironmentFault
+
+
+def validate(
+    config: options.Config,
+    runs: options.Runs = None,
+    seed: options.Seed = None,
+    settings: options.Set = None,
+    json: options.Json = False,
+) -> None:
+    """Check an experiment file; say everything that is wrong with it."""
+    try:
+        experiment = options.experiment(config, runs, seed, settings)
+    except ConfigError as error:
+        if json:
+            output.as_json({"valid": False, "problems": [each._asdict() for each in error.problems]})
+        raise
+    if json:
+        output.as_json({"valid": True, "hash": experiment.hash12(), "resolved": experiment.resolved()})
+        return
+    print(f"{config}: valid")
+    times = ", ".join(f"{time:g}" for time in experiment.report_times)
+    output.definitions(
+        [
+            ("question", experiment.question or "none; make it the first line: # ..."),
+            ("system", experiment.system.name),
+            ("filters", ", ".join(experiment.labels)),
+            ("time", f"to {experiment.time.end:g} in steps of {experiment.time.step:g}; reports at {times}"),
+            ("runs", f"{experiment.monte_carlo.runs:,}, seed {experiment.monte_carlo.seed}"),
+            ("claims", ", ".join(each.id for each in experiment.claims) or "none"),
+            ("results", f"{experiment.experiment}/{experiment.hash12()}"),
+        ]
+    )
+    output.next_step(
+        options.command("plan", config, settings), "says how long it takes and how much it needs"
+    )
+
+
+def plan(
+    config: options.Config,
+    runs: options.Runs = None,
+    seed: options.Seed = None,
+    settings: options.Set = None,
+    json: options.Json = False,
+) -> None:
+    """Say what a run costs: time, memory, disk."""
+    experiment = options.experiment(config, runs, seed, settings)
+    from nlbench import runtime
+
+    runtime.configure(precision=experiment.engine.precision, threads=experiment.engine.threads)
+    from nlbench import engine
+
+    cost = engine.plan(experiment)
+    if json:
+        output.as_json(cost)
+        return
+    print(f"{experiment.experiment}, {experiment.monte_carlo.runs:,} runs")
+    output.definitions((_title(name), _amount(name, value)) for name, value in cost.items())
+    options_given = [word for pair in (("--runs", runs), ("--seed", seed)) if pair[1] for word in pair]
+    output.next_step(options.command("run", config, settings, *map(str, options_given)), "runs it")
+
+
+def _title(name: str) -> str:
+    return name.replace("_seconds", "_time").removesuffix("_bytes").replace("_", " ")
+
+
+def _amount(name: str, value: Any) -> str:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
+    if "second" in name or name == "time":
+        return output.duration(value)
+    if any(word in name for word in ("memory", "disk", "bytes")):
+        return output.size(value)
+    return f"{value:,}" if isinstance(value, int) else f"{value:,.3g}"
+
+
+def doctor(json: options.Json = False) -> None:
+    """Check this machine: libraries, devices, settings, disk."""
+    from nlbench import doctor as machine
+    from nlbench import runtime
+
+    runtime.configure()
+    findings = [(str(name), bool(ok), str(detail)) for name, ok, detail in machine.doctor()]
+    wrong = [name for name, ok, _ in findings if not ok]
+    if json:
+        output.as_json([{"name": name, "ok": ok, "detail": detail} for name, ok, detail in findings])
+    else:
+        output.definitions((f"{'ok  ' if ok else 'BAD '} {name}", detail) for name, ok, detail in findings)
+        if not wrong:
+            output.next_step("nlbench list experiments", "shows what there is to run")
+    if wrong:
+        raise EnvironmentFault(f"not in order: {', '.join(wrong)}")

@@ -1,0 +1,75 @@
+"""`nlbench report` and `replay`: what a finished run can still show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nlbench.cli import options, output
+from nlbench.errors import ConfigError
+
+
+def report(
+    where: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FOLDER|CONFIG", help="Folder of a run, or its experiment file.", show_default=False
+        ),
+    ],
+    settings: options.Set = None,
+    out: options.Out = Path("results"),
+) -> None:
+    """Draw figures and write the report from saved tables."""
+    folder = where
+    if not where.is_dir():
+        folder = options.folder(options.experiment(where, None, None, settings), out)
+        if not folder.is_dir():
+            first = options.command("run", where, settings)
+            raise ConfigError(f"{where}: no results in {folder}; make them with: {first}")
+    from nlbench import report as reports
+    from nlbench.results.results import Results
+
+    page = reports.write(Results(folder))
+    print(f"report  {page}")
+    output.next_step(f"open {page}", "all figures and tables on one page; it needs no network")
+
+
+def replay(
+    config: options.Config,
+    label: Annotated[str, typer.Option("--filter", metavar="LABEL", help="Label of a filter in the file.")],
+    trajectory: Annotated[
+        int, typer.Option("--trajectory", metavar="N", min=0, help="Number of the run, from 0.")
+    ],
+    seed: options.Seed = None,
+    settings: options.Set = None,
+    csv: Annotated[
+        Path | None, typer.Option("--csv", metavar="FILE", help="Write a CSV file instead of printing.")
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """Show one run of one filter, step by step."""
+    experiment = options.experiment(config, None, seed, settings)
+    if label not in experiment.labels:
+        from nlbench.suggestions import suggestion
+
+        raise ConfigError(f"--filter: no filter is labelled '{label}'{suggestion(label, experiment.labels)}")
+    from nlbench import runtime
+
+    runtime.configure(precision=experiment.engine.precision, threads=experiment.engine.threads)
+    from nlbench import engine
+
+    frame = engine.replay(experiment, label, trajectory)
+    if csv is not None:
+        frame.to_csv(csv, index=False)
+        print(f"{csv}: {len(frame):,} rows")
+    elif json:
+        output.as_json(frame.to_dict(orient="records"))
+        return
+    else:
+        print(frame.to_string(index=False, line_width=output.WIDTH))
+    other = options.command(
+        "replay", config, settings, "--filter", label, "--trajectory", str(trajectory + 1)
+    )
+    output.next_step(other, "shows the next run")

@@ -1,0 +1,116 @@
+"""The essence of a run: rms at the report times, divergence, claims; and what makes the command fail."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nlbench.cli import output
+from nlbench.errors import GateError, LimitError, NlbenchError
+
+if TYPE_CHECKING:
+    from nlbench.config import Experiment
+
+VERDICT_STYLES = {"confirmed": "green", "refuted": "red"}
+
+
+def facts(experiment: Experiment, results: Any, report: Path) -> dict[str, Any]:
+    """What `--json` prints, and what the other functions here read."""
+    statistics = results.table("statistics")
+    rms = statistics[(statistics["statistic"] == "rms") & ~statistics["time"].astype(str).eq("all")]
+    near = rms["time"].astype(float).round(9).isin([round(time, 9) for time in experiment.report_times])
+    folder = Path(results.path)
+    return {
+        "experiment": experiment.experiment,
+        "hash": experiment.hash12(),
+        "runs": experiment.monte_carlo.runs,
+        "seed": experiment.monte_carlo.seed,
+        "folder": str(folder),
+        "report": str(report),
+        "figures": sorted(str(each) for each in (folder / "figures").glob("*")),
+        "rms": _records(rms[near]),
+        "divergence": _records(results.table("divergence")),
+        "claims": _records(results.table("claims")) if experiment.claims else [],
+    }
+
+
+def failed(facts: dict[str, Any]) -> list[str]:
+    """Labels of filters without a single usable number: every run diverged, or every rms is NaN."""
+    labels = []
+    for row in facts["divergence"]:
+        values = [each["value"] for each in facts["rms"] if each["filter"] == row["filter"]]
+        if row["diverged"] >= row["n"] or (values and all(math.isnan(value) for value in values)):
+            labels.append(row["filter"])
+    return labels
+
+
+def faults(experiment: Experiment, facts: dict[str, Any], gate: bool) -> list[NlbenchError]:
+    """What makes the command fail, the gravest first."""
+    found: list[NlbenchError] = []
+    lost, limit = failed(facts), experiment.limits.diverged
+    found += [LimitError(f"FAILED: {label}: no run gave a usable estimate") for label in lost]
+    for row in facts["divergence"]:
+        if row["filter"] not in lost and row["diverged"] / row["n"] > limit:
+            share = f"{output.percent(row['diverged'] / row['n'])} % of the runs"
+            allowed = f"limits.diverged allows {output.percent(limit)} %"
+            found.append(LimitError(f"FAILED: {row['filter']}: diverged in {share}; {allowed}"))
+    if gate:
+        open_claims = [
+            f"{each['id']} {each['verdict']}" for each in facts["claims"] if each["verdict"] != "confirmed"
+        ]
+        found += [GateError(f"gate failed: {', '.join(open_claims)}")] if open_claims else []
+    return found
+
+
+def show(experiment: Experiment, facts: dict[str, Any]) -> None:
+    """Print the facts within 80 columns."""
+    print(output.styled(experiment.question, "bold") if experiment.question else experiment.experiment)
+    print(f"{experiment.experiment}, {facts['runs']:,} runs, seed {facts['seed']}, results {facts['hash']}\n")
+    lost = failed(facts)
+    for coordinate in dict.fromkeys(row["coordinate"] for row in facts["rms"]):
+        _rms(experiment, [row for row in facts["rms"] if row["coordinate"] == coordinate], coordinate, lost)
+    print("\nruns that diverged")
+    output.rows(
+        [row["filter"], _diverged(row), _failed(row["filter"] in lost)] for row in facts["divergence"]
+    )
+    if facts["claims"]:
+        print("\nclaims")
+        says = {each.id: each.says for each in experiment.claims}
+        for row in facts["claims"]:
+            verdict = output.styled(row["verdict"].ljust(9), VERDICT_STYLES.get(row["verdict"], "yellow"))
+            print(f"  {row['id']}  {verdict}  {says.get(row['id'], row['says'])}")
+    print("\nfiles")
+    written = [("report", facts["report"]), ("tables", f"{facts['folder']}/tables")]
+    output.rows([*written, ("figures", f"{facts['folder']}/figures ({len(facts['figures'])})")])
+
+
+def _rms(experiment: Experiment, rows: list[dict[str, Any]], coordinate: str, lost: list[str]) -> None:
+    label_width = max(len(label) for label in experiment.labels)
+    columns = max(1, (output.WIDTH - label_width - 2) // 13)
+    times = sorted({float(row["time"]) for row in rows})
+    cells = {(row["filter"], float(row["time"])): row for row in rows}
+    print(f"rms error of {coordinate}; 0.1234(12) is 0.1234 with a standard error of 0.0012")
+    for start in range(0, len(times), columns):
+        shown = times[start : start + columns]
+        table = [["", *(f"t = {time:g}" for time in shown)]]
+        for label in experiment.labels:
+            values = [cells.get((label, time)) for time in shown]
+            text = [output.uncertain(row["value"], row["stderr"]) if row else "" for row in values]
+            table.append([label, *(["FAILED"] * len(shown) if label in lost else text)])
+        output.rows(table)
+
+
+def _diverged(row: dict[str, Any]) -> str:
+    interval = f"[{output.percent(row['low'])}, {output.percent(row['high'])}]"
+    return (
+        f"diverged {row['diverged']:,.0f} of {row['n']:,.0f} ({output.percent(row['fraction'])} % {interval})"
+    )
+
+
+def _failed(is_so: bool) -> str:
+    return output.styled("FAILED", "red") if is_so else ""
+
+
+def _records(frame: Any) -> list[dict[str, Any]]:
+    return frame.to_dict(orient="records")

@@ -1,0 +1,7 @@
+"""Experiment files: their schema, loading with positions, and identity. Loads no numerical library."""
+
+from nlbench.config.load import from_dict, load
+from nlbench.config.overrides import Override
+from nlbench.config.schema import Claim, Experiment, FilterSpec
+
+__all__ = ["Claim", "Experiment", "FilterSpec", "Override", "from_dict", "load"]

@@ -1,0 +1,228 @@
+"""Plain data to an Experiment: each section is validated, then all against each other, findings are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from nlbench.config import consistency
+from nlbench.config.explain import Finding, found, plain, validated
+from nlbench.config.places import Path
+from nlbench.config.schema import (
+    Claim,
+    EngineSpec,
+    Experiment,
+    FilterSpec,
+    Head,
+    Initial,
+    Label,
+    Limits,
+    MonteCarlo,
+    Section,
+    Source,
+    SystemSpec,
+    TimeSpec,
+)
+from nlbench.filters import catalogue
+from nlbench.suggestions import closest, suggestion
+
+MANDATORY = ("experiment", "system", "filters")
+KEYS = tuple(key for key in Experiment.model_fields if key != "question")
+SECTIONS: dict[str, type[Section]] = {
+    "monte_carlo": MonteCarlo,
+    "source": Source,
+    "engine": EngineSpec,
+    "limits": Limits,
+}
+
+
+class Named(Section):
+    """What every entry of `filters` has, apart from the filter's own options."""
+
+    name: str
+    label: Label | None = None
+    model: dict[str, Any] | None = None
+    initial: dict[str, Any] | None = None
+
+
+def assemble(raw: Mapping[str, Any], question: str = "") -> tuple[Experiment | None, list[Finding]]:
+    """The experiment that the data state, or None, and everything that is wrong with them."""
+    raw = {key: value for key, value in plain(dict(raw)).items() if value is not None or key in MANDATORY}
+    findings = _unknown_keys(raw)
+    parts: dict[str, Any] = {}
+    head, wrong = validated(Head, {key: raw[key] for key in Head.model_fields if key in raw})
+    findings += [each for each in wrong if each.path != ("experiment",) or "experiment" in raw]
+    for key, model in SECTIONS.items():
+        parts[key], wrong = validated(model, raw.get(key, {}), (key,))
+        findings += wrong
+    parts["initial"], wrong = _initial(raw.get("initial", {}), ("initial",))
+    findings += wrong
+    name, system = _system(raw, findings)
+    parts["system"] = system
+    parts["truth"] = _believed(name, system, raw.get("truth", {}), ("truth",), findings)
+    entries = _entries(raw, findings)
+    filters = parts["filters"] = [
+        _filter(each, ("filters", index), name, system, findings) for index, each in enumerate(entries)
+    ]
+    labels = [_label(each) for each in entries] + ([head.reference] if head and head.reference else [])
+    time = parts["time"] = _time(raw, system, findings)
+    claims = parts["claims"] = _claims(raw, findings)
+    reports = consistency.report_times(head, time)
+    findings += consistency.times(time, reports, system, filters, parts["truth"])
+    findings += consistency.labels(labels, len(entries))
+    findings += consistency.claims(claims, labels, reports)
+    if findings or head is None or reports is None:
+        return None, findings
+    parts["claims"] = [each.model_copy(update={"at": each.at or reports}) for each in claims if each]
+    parts.update(head.model_dump(), report_times=reports, question=question)
+    return Experiment(**parts), []
+
+
+def _unknown_keys(raw: Mapping[str, Any]) -> list[Finding]:
+    findings = [Finding((key,), f"missing; {_MEANINGS[key]}", True) for key in MANDATORY if key not in raw]
+    nested: dict[str, str] = {}
+    for section, fields in [("time", TimeSpec.model_fields)] + [
+        (k, m.model_fields) for k, m in SECTIONS.items()
+    ]:
+        for key in fields:
+            nested.setdefault(key, section)
+    for key in raw:
+        if key in KEYS:
+            continue
+        near = closest(key, [*KEYS, *nested])
+        hint = f"; did you mean '{nested[near]}.{near}'?" if near in nested else suggestion(key, KEYS)
+        findings.append(Finding((key,), f"unknown key{hint}", True))
+    return findings
+
+
+_MEANINGS = {
+    "experiment": "expected the experiment's name, such as 'culver/hermite-01'",
+    "system": "expected the system, such as {name: culver-scalar}",
+    "filters": "expected a list of filters, such as [linearised-kalman, third-order]",
+}
+
+
+def _system(raw: Mapping[str, Any], findings: list[Finding]) -> tuple[str | None, SystemSpec | None]:
+    """The system's name, if it is known, and the system, if all its parameters are right."""
+    from nlbench import systems
+
+    if "system" not in raw:
+        return None, None
+    given = _entry(raw["system"])
+    if not isinstance(given, dict) or not isinstance(given.get("name"), str):
+        findings.append(_nameless(given, ("system",), "system"))
+        return None, None
+    name = given.pop("name")
+    if name not in systems.available():
+        findings.append(
+            Finding(("system", "name"), f"unknown system '{name}'{suggestion(name, systems.available())}")
+        )
+        return None, None
+    parameters = _kept(validated(systems.parameters(name), given, ("system",)), findings)
+    return name, SystemSpec(name=name, parameters=parameters.model_dump(mode="json")) if parameters else None
+
+
+def _entry(given: Any) -> Any:
+    """A name alone is short for a mapping with nothing but that name."""
+    return {"name": given} if isinstance(given, str) else dict(given) if isinstance(given, dict) else given
+
+
+def _nameless(given: Any, path: Path, what: str) -> Finding:
+    if isinstance(given, dict) and "name" not in given:
+        return Finding((*path, "name"), f"missing; expected the {what}'s name", at_key=True)
+    if isinstance(given, dict):
+        return Finding((*path, "name"), f"expected the {what}'s name, found {found(given['name'])}")
+    return Finding(path, f"expected a {what}'s name or a mapping with one, found {found(given)}")
+
+
+def _believed(
+    name: str | None, system: SystemSpec | None, given: Any, path: Path, findings: list[Finding]
+) -> dict[str, Any]:
+    """Parameters of the system that the truth, or what a filter believes, overrides."""
+    from nlbench import systems
+
+    if not isinstance(given, dict):
+        findings.append(Finding(path, f"expected a mapping of the system's parameters, found {found(given)}"))
+        return {}
+    if not name or not given:
+        return {}
+    base = system.parameters if system else {}
+    parameters, wrong = validated(systems.parameters(name), {**base, **given}, path)
+    findings += [each for each in wrong if system or (each.path != path and each.path[len(path)] in given)]
+    return (
+        {key: value for key, value in parameters.model_dump(mode="json").items() if key in given}
+        if parameters
+        else {}
+    )
+
+
+def _entries(raw: Mapping[str, Any], findings: list[Finding]) -> list[Any]:
+    given = raw.get("filters", [])
+    if "filters" in raw and (not isinstance(given, list) or not given):
+        findings.append(Finding(("filters",), f"{_MEANINGS['filters']}, found {found(given)}"))
+        return []
+    return [_entry(each) for each in given]
+
+
+def _label(entry: Any) -> str | None:
+    """The label of an entry, as far as it can be told when other things about the entry are wrong."""
+    if not isinstance(entry, dict):
+        return None
+    name = entry.get("name")
+    label = entry.get("label", name if name in catalogue.available() else None)
+    return label if isinstance(label, str) else None
+
+
+def _filter(
+    given: Any, path: Path, system_name: str | None, system: SystemSpec | None, findings: list[Finding]
+) -> FilterSpec | None:
+    if not isinstance(given, dict) or not isinstance(given.get("name"), str):
+        findings.append(_nameless(given, path, "filter"))
+        return None
+    before = len(findings)
+    named = _kept(
+        validated(Named, {key: given[key] for key in Named.model_fields if key in given}, path), findings
+    )
+    name, options = given["name"], None
+    if name in catalogue.available():
+        own = {key: value for key, value in given.items() if key not in Named.model_fields}
+        options = _kept(validated(catalogue.options(name), own, path), findings)
+    else:
+        at = (*path, "name")
+        findings.append(Finding(at, f"unknown filter '{name}'{suggestion(name, catalogue.available())}"))
+    model = _believed(system_name, system, given.get("model") or {}, (*path, "model"), findings)
+    initial, wrong = _initial(given.get("initial") or {}, (*path, "initial"))
+    findings += wrong
+    if len(findings) > before or named is None or options is None:
+        return None
+    options = options.model_dump(mode="json")
+    return FilterSpec(name=name, label=named.label or name, options=options, model=model, initial=initial)
+
+
+def _initial(given: Any, path: Path) -> tuple[dict[str, Any], list[Finding]]:
+    initial, findings = validated(Initial, given, path)
+    return (initial.moments() if initial else {}), findings
+
+
+def _time(raw: Mapping[str, Any], system: SystemSpec | None, findings: list[Finding]) -> TimeSpec | None:
+    """The times; what the file leaves out follows from the system's interval between measurements."""
+    given = raw.get("time", {})
+    if not isinstance(given, dict):
+        return _kept(validated(TimeSpec, given, ("time",)), findings)
+    defaults = consistency.default_times(system, given) if system else {}
+    if system is None and any(key not in given for key in TimeSpec.model_fields):
+        return None
+    return _kept(validated(TimeSpec, {**defaults, **given}, ("time",)), findings)
+
+
+def _claims(raw: Mapping[str, Any], findings: list[Finding]) -> list[Claim | None]:
+    given = raw.get("claims", [])
+    if not isinstance(given, list):
+        findings.append(Finding(("claims",), f"expected a list of claims, found {found(given)}"))
+        return []
+    return [_kept(validated(Claim, each, ("claims", index)), findings) for index, each in enumerate(given)]
+
+
+def _kept(result: tuple[Any, list[Finding]], findings: list[Finding]) -> Any:
+    findings += result[1]
+    return result[0]

@@ -1,0 +1,37 @@
+"""From a file or plain data to an Experiment, or to a ConfigError that holds every problem."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from nlbench.config import document as documents
+from nlbench.config import overrides as settings
+from nlbench.config.assemble import assemble
+from nlbench.config.places import dotted
+from nlbench.config.schema import Experiment
+from nlbench.errors import ConfigError, Problem
+
+
+def load(path: str | os.PathLike[str], overrides: Sequence[str | settings.Override] = ()) -> Experiment:
+    """The experiment in a YAML file, with overrides (`time.step=0.01`) applied in their order.
+
+    Raises `ConfigError`: alone, for what cannot be read (no file, bad syntax, duplicate keys); otherwise with
+    every problem of keys, values, names and their consistency, each with its place in the file or option.
+    """
+    document = documents.read(path)
+    settings.apply(document, [settings.parse(each) if isinstance(each, str) else each for each in overrides])
+    experiment, findings = assemble(document.data, document.question)
+    if experiment is None:
+        problems = [document.problem(each.path, each.message, each.at_key) for each in findings]
+        raise ConfigError(sorted(problems, key=lambda each: (each.line or 0, each.column or 0)))
+    return experiment
+
+
+def from_dict(data: Mapping[str, Any], question: str = "") -> Experiment:
+    """The experiment in plain data with the keys of a file. Raises `ConfigError` with every problem."""
+    experiment, findings = assemble(data, question)
+    if experiment is None:
+        raise ConfigError([Problem(each.message, dotted(each.path)) for each in findings])
+    return experiment

@@ -1,0 +1,230 @@
+"""What an experiment consists of. Every key, its range and its default stand here."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from nlbench.config.identity import canonical_hash, to_yaml
+
+LARGEST = 2**63 - 1
+STEM = re.compile(r"[a-z0-9][a-z0-9_.-]*")
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Statistic = Literal[
+    "rms",
+    "rms_clipped",
+    "median_error",
+    "mean_error",
+    "variance_estimated",
+    "variance_actual",
+    "third_estimated",
+    "third_actual",
+    "nees",
+    "coverage_95",
+]
+
+
+def _path_like(name: str) -> str:
+    """A name that is safe as a folder below the results: no way out of it, and nothing hidden in it."""
+    safe = all(STEM.fullmatch(part) and not part.endswith(".") for part in name.split("/"))
+    if not safe or len(name) > 100:
+        allowed = "parts of a-z 0-9 - _ . with / between them"
+        raise ValueError(f"expected a name such as 'culver/hermite-01' ({allowed}), found {name[:60]!r}")
+    return name
+
+
+def _one_line(text: str) -> str:
+    if not text.isprintable() or text != text.strip():
+        raise ValueError(f"expected one line of printable text without spaces around it, found {text[:60]!r}")
+    return text
+
+
+Name = Annotated[str, AfterValidator(_path_like)]
+Label = Annotated[str, Field(min_length=1, max_length=60), AfterValidator(_one_line)]
+
+
+class Section(BaseModel):
+    """A part of the experiment file: immutable, unknown keys refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Head(Section):
+    """The keys at the top level that are not sections."""
+
+    experiment: Name = Field(description="name, also the folder of the results")
+    reference: Literal["exact"] | None = Field(default=None, description="exact posterior beside the filters")
+    report_times: list[Positive] | None = Field(
+        default=None,
+        min_length=1,
+        description="where claims, medians and kept runs are taken; default: the end",
+    )
+    figures: list[str] | None = Field(
+        default=None, description="kinds of figures to draw; default: all that apply"
+    )
+
+
+class SystemSpec(Section):
+    """A system by name, with all its parameters."""
+
+    name: str
+    parameters: dict[str, Any] = Field(default_factory=dict)
+
+
+class FilterSpec(Section):
+    """A filter by name, with all its options, and the parameters and initial moments that it believes in."""
+
+    name: str
+    label: Label
+    options: dict[str, Any] = Field(default_factory=dict)
+    model: dict[str, Any] = Field(default_factory=dict)
+    initial: dict[str, Any] = Field(default_factory=dict)
+
+
+class Initial(Section):
+    """Initial moments; a variance is short for a diagonal covariance."""
+
+    mean: Finite | list[Finite] | None = None
+    cov: list[list[Finite]] | None = None
+    variance: Annotated[float, Field(ge=0)] | list[Annotated[float, Field(ge=0)]] | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Initial:
+        if self.cov is not None and self.variance is not None:
+            raise ValueError("cov and variance exclude each other")
+        moments = self.moments()
+        cov, mean = moments.get("cov"), moments.get("mean")
+        if cov is None:
+            return self
+        size = len(cov)
+        if any(len(row) != size for row in cov):
+            raise ValueError("cov must be square")
+        if mean is not None and len(mean) != size:
+            raise ValueError(f"mean has {len(mean)} entries but the covariance {size}")
+        pairs = [(i, j) for i in range(size) for j in range(i + 1)]
+        if any(cov[i][j] != cov[j][i] for i, j in pairs):
+            raise ValueError("cov must be symmetric")
+        if any(cov[i][j] ** 2 > cov[i][i] * cov[j][j] * (1 + 1e-9) or cov[i][i] < 0 for i, j in pairs):
+            raise ValueError("cov must be positive semidefinite")
+        return self
+
+    def moments(self) -> dict[str, Any]:
+        """`mean` (list) and `cov` (list of rows), as far as they were given."""
+        moments: dict[str, Any] = {}
+        if self.mean is not None:
+            moments["mean"] = self.mean if isinstance(self.mean, list) else [self.mean]
+        if self.cov is not None:
+            moments["cov"] = self.cov
+        elif self.variance is not None:
+            diagonal = self.variance if isinstance(self.variance, list) else [self.variance]
+            moments["cov"] = [
+                [each if i == j else 0.0 for j in range(len(diagonal))] for i, each in enumerate(diagonal)
+            ]
+        return moments
+
+
+class TimeSpec(Section):
+    """The span of a run: end, integration step, and grid of the curves."""
+
+    end: Positive = Field(description="duration of a run")
+    step: Positive = Field(description="integration step")
+    output: Positive = Field(description="spacing of the times at which statistics are taken")
+
+
+class MonteCarlo(Section):
+    """How many runs, from which seed, and how many of them to keep one by one."""
+
+    runs: int = Field(default=1000, ge=1, le=LARGEST, description="number of trajectories")
+    seed: int = Field(default=1969, ge=0, le=LARGEST, description="seed of truth and noise")
+    keep_runs: int = Field(
+        default=20_000, ge=0, le=10_000_000, description="runs whose errors are kept one by one"
+    )
+
+
+class Source(Section):
+    """The publication that the experiment reproduces."""
+
+    document: str | None = None
+    figures: list[str] = Field(default_factory=list)
+    tables: list[str] = Field(default_factory=list)
+    runs: int | None = Field(default=None, ge=1, description="the source's number of runs")
+
+
+class Claim(Section):
+    """An ordering that a statistic is expected to show: each label's value is less than the next one's."""
+
+    id: Label
+    says: str
+    statistic: Statistic
+    less: list[str] = Field(min_length=2)
+    at: list[Positive] = Field(default_factory=list, description="report times; default: all")
+    coordinate: str | None = Field(default=None, description="default: the first")
+
+
+class EngineSpec(Section):
+    """How the runs are computed. Only block and precision can change a digit of the results."""
+
+    chunk: int | None = Field(default=None, ge=1, le=1_000_000, description="blocks in each call")
+    threads: int | None = Field(default=None, ge=1, le=4096, description="default: one for each core")
+    block: int = Field(default=64, ge=1, le=65536, description="trajectories in a block")
+    precision: Literal["float64", "float32"] = "float64"
+
+
+class Limits(Section):
+    """What makes `nlbench run` exit with 4."""
+
+    diverged: Fraction = Field(default=1.0, description="largest fraction of diverged runs of a filter")
+
+
+class Experiment(Section):
+    """A validated experiment: names are known, every parameter is filled in, times fit each other."""
+
+    experiment: Name
+    question: str = ""
+    system: SystemSpec
+    filters: list[FilterSpec]
+    reference: Literal["exact"] | None = None
+    time: TimeSpec
+    report_times: list[Positive]
+    monte_carlo: MonteCarlo = MonteCarlo()
+    truth: dict[str, Any] = Field(default_factory=dict)
+    initial: dict[str, Any] = Field(default_factory=dict)
+    source: Source = Source()
+    claims: list[Claim] = Field(default_factory=list)
+    engine: EngineSpec = EngineSpec()
+    limits: Limits = Limits()
+    figures: list[str] | None = None
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the filters in the order of the file; the reference, if any, is the last."""
+        return (*(each.label for each in self.filters), *([self.reference] if self.reference else []))
+
+    def layout_times(self) -> tuple[tuple[float, ...], tuple[int, ...]]:
+        """The output times, 0 included, and the positions of the report times among them."""
+        count = round(self.time.end / self.time.output)
+        times = tuple(round(index * self.time.output, 12) for index in range(count + 1))
+        return times, tuple(round(time / self.time.output) for time in self.report_times)
+
+    def resolved(self) -> dict[str, Any]:
+        """The experiment as a file would state it with every default written out; `load` takes it back."""
+        plain = self.model_dump(mode="json", exclude={"question"})
+        plain["system"] = {"name": self.system.name, **plain["system"]["parameters"]}
+        for each in plain["filters"]:
+            beliefs = {key: value for key in ("model", "initial") if (value := each.pop(key))}
+            each.update(each.pop("options"), **beliefs)
+        return plain
+
+    def resolved_yaml(self) -> str:
+        """`resolved()` as a YAML file, headed by the question."""
+        return to_yaml(self.resolved(), self.question)
+
+    def hash12(self) -> str:
+        """Identifies results that may be mixed: all counts but how many runs and how computed."""
+        plain = self.resolved()
+        del plain["monte_carlo"]["runs"], plain["engine"]["chunk"], plain["engine"]["threads"]
+        return canonical_hash(plain)

@@ -1,0 +1,77 @@
+"""A finished run, read from its folder; every file is checked against the manifest before it is believed."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nlbench.errors import DamagedResults
+from nlbench.results import checksum
+from nlbench.results.folder import EXPERIMENT, MANIFEST, TABLES
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from nlbench.config import Experiment
+
+
+class Results:
+    """`results.table("statistics")`, `results.manifest`, `results.experiment`, `results.path`."""
+
+    def __init__(self, path: str | Path):
+        self.path = Path(path)
+
+    def __repr__(self) -> str:
+        return f"Results({str(self.path)!r})"
+
+    @cached_property
+    def manifest(self) -> dict[str, Any]:
+        """Versions, seed, times, units and checksums."""
+        from nlbench.results.manifest import read_manifest
+
+        return read_manifest(self.path / MANIFEST)
+
+    @cached_property
+    def experiment(self) -> Experiment:
+        """The experiment with all its defaults filled in."""
+        from nlbench.config import load
+
+        self._checked(EXPERIMENT)
+        return load(self.path / EXPERIMENT)
+
+    @property
+    def tables(self) -> tuple[str, ...]:
+        """Names of the tables that there are."""
+        files = (Path(name) for name in self.manifest["checksums"])
+        return tuple(file.stem for file in files if str(file.parent) == TABLES and file.suffix == ".parquet")
+
+    def table(self, name: str) -> pd.DataFrame:
+        """A table by name. Raises `DamagedResults` if its file is not the one that the run wrote."""
+        from nlbench.results.tables import read_parquet
+
+        if name not in self.tables:
+            raise KeyError(f"{self.path} has no table '{name}'; it has {', '.join(self.tables)}")
+        return read_parquet(self._checked(f"{TABLES}/{name}.parquet"))
+
+    def damaged(self) -> list[str]:
+        """What is wrong with each file that is missing or was changed since the run wrote it."""
+        found = []
+        for name in self.manifest["checksums"]:
+            try:
+                self._checked(name)
+            except DamagedResults as error:
+                found.append(str(error))
+        return found
+
+    def _checked(self, name: str) -> bytes:
+        path = self.path / name
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            raise DamagedResults(f"{path}: cannot be read ({error.strerror})") from error
+        if checksum.of_bytes(data) != self.manifest["checksums"].get(name):
+            raise DamagedResults(
+                f"{path}: the checksum is not that of the manifest; the file is damaged or edited"
+            )
+        return data

@@ -1,0 +1,1 @@
+"""From the tracks of a block to the tables of an experiment: sums, totals, summaries and claims."""

@@ -1,0 +1,23 @@
+"""What the filters did on one block of trajectories: the input of the statistics."""
+
+from typing import NamedTuple
+
+from jaxtyping import Array, Bool, Float, Int
+
+
+class Tracks(NamedTuple):
+    """Axes: F filters, T output times (t = 0 first), R report times, C coordinates, L lanes (trajectories).
+
+    A filter that does not carry third moments gives zeros. The unique components of `cov` and `cross_third`
+    are in the order of `Layout.components`.
+    """
+
+    error: Float[Array, "F T C L"]  # truth minus estimate
+    variance: Float[Array, "F T C L"]  # estimated, per coordinate
+    third: Float[Array, "F T C L"]  # estimated third central moment, per coordinate
+    nees: Float[Array, "F T L"]  # joint e' P^-1 e; NaN where P is not positive definite
+    cov: Float[Array, "F R C2 L"]  # estimated covariance
+    cross_third: Float[Array, "F R C3 L"]  # estimated third central moments
+    diverged: Bool[Array, "F T L"]  # by the system's rule
+    guarded: Int[Array, "F L"]  # updates in which the guard fired
+    updates: int | Int[Array, ""]  # updates per run

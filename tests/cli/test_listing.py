@@ -1,0 +1,76 @@
+"""Claim: everything that an experiment file may name can be listed, for people and for programs."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from nlbench import doctor, engine, systems
+from nlbench.cli.app import app
+from nlbench.filters import catalogue
+from tests.example import VALID, spoiled, written
+
+
+def invoke(*arguments: str):
+    return CliRunner().invoke(app, list(arguments))
+
+
+@pytest.mark.parametrize(("what", "registry"), [("systems", systems), ("filters", catalogue)])
+def test_every_registered_name_is_listed_with_its_meaning(what, registry):
+    listed = json.loads(invoke("list", what, "--json").stdout)
+    assert [each["name"] for each in listed] == list(registry.available())
+    assert [each["summary"] for each in listed] == [registry.summary(name) for name in registry.available()]
+    text = invoke("list", what).stdout
+    assert all(name in text for name in registry.available())
+    assert max(map(len, text.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    ("what", "name", "model"),
+    [("systems", name, systems.parameters(name)) for name in systems.available()]
+    + [("filters", name, catalogue.options(name)) for name in catalogue.available()],
+)
+def test_the_parameters_of_every_name_can_be_shown(what, name, model):
+    shown = json.loads(invoke("list", what, name, "--json").stdout)
+    assert [each["name"] for each in shown["parameters"]] == list(model.model_fields)
+    assert invoke("list", what, name).exit_code == 0
+
+
+def test_experiments_are_listed_by_their_question_and_invalid_ones_are_said_to_be(tmp_path):
+    (tmp_path / "culver").mkdir()
+    written(tmp_path / "culver", VALID, "good.yaml")
+    written(tmp_path, spoiled("limiter", "limter"), "bad.yaml")
+    listed = json.loads(invoke("list", "experiments", "--configs", str(tmp_path), "--json").stdout)
+    assert [each["valid"] for each in listed] == [False, True]
+    assert listed[1]["question"] == "Does carrying the third moment pay when measurements arrive?"
+    assert "not valid (1 problem)" in invoke("list", "experiments", "--configs", str(tmp_path)).stdout
+
+
+def test_validate_tells_programs_what_it_tells_people(tmp_path):
+    good = json.loads(invoke("validate", str(written(tmp_path, VALID)), "--json").stdout)
+    assert good["valid"]
+    assert good["resolved"]["monte_carlo"]["runs"] == 20_000
+    bad = invoke("validate", str(written(tmp_path, spoiled("limiter", "limter"))), "--json")
+    assert bad.exit_code == 2
+    (problem,) = json.loads(bad.stdout)["problems"]
+    assert (problem["line"], problem["path"]) == (6, "filters.1.limter")
+
+
+def test_plan_says_what_a_run_needs_in_units_of_people(tmp_path, monkeypatch):
+    cost = {"runs": 20_000, "seconds": 90.0, "memory_bytes": 3 * 2**20, "filters": ["a", "b"]}
+    monkeypatch.setattr(engine, "plan", lambda experiment: cost)
+    text = invoke("plan", str(written(tmp_path, VALID)), "--runs", "1e5").stdout
+    for words in ("1.5 min", "3.0 MiB", "20,000", "a, b", "--runs 1e5"):
+        assert words in text
+    assert json.loads(invoke("plan", str(tmp_path / "fig.yaml"), "--json").stdout) == cost
+
+
+def test_doctor_ends_with_five_when_something_is_wrong(monkeypatch):
+    monkeypatch.setattr(doctor, "doctor", lambda: [("python", True, "3.12"), ("jax", False, "missing")])
+    done = invoke("doctor")
+    assert done.exit_code == 5
+    assert done.stderr == "not in order: jax\n"
+    monkeypatch.setattr(doctor, "doctor", lambda: [("python", True, "3.12")])
+    assert invoke("doctor").exit_code == 0
