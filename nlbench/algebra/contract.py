@@ -15,20 +15,21 @@ from nlbench.algebra.tensor import Groups, Index, Tensor, canonical_indices, sor
 Factors = tuple[tuple[str, Tensor, int], ...]
 
 
-def einsum(subscripts: str, *operands: Tensor, sym: str = "") -> Tensor:
+def einsum(subscripts: str, *operands: Tensor, sym: str = "", times: float = 1.0) -> Tensor:
     """Contract tensors as numpy.einsum does, forming unique and nonzero components only.
 
     subscripts: such as "ie,je->ij"; a letter stands once in the output, or twice among the operands.
     sym: output letters known to be exchangeable, such as "ij" (several groups: "ij,kl"). Symmetry that the expression
         shows by itself, as H_ia H_jb P_ab does in ij, needs no mention.
+    times: a known factor of the result.
     """
     factors, output = _parse(subscripts, operands)
     symmetry = _declared(sym, output) if sym else _symmetry(factors, output)
-    return _evaluate([factors], output, symmetry)
+    return _evaluate([factors], output, symmetry, times)
 
 
-def placements(number: int, subscripts: str, *operands: Tensor) -> Tensor:
-    """N{...}: the sum over the distinct placements of the output indices, fully symmetric.
+def placements(number: int, subscripts: str, *operands: Tensor, times: float = 1.0) -> Tensor:
+    """N{...} `times` a factor: the sum over distinct placements of the output indices, fully symmetric.
 
     `number` is N, as the sources write it; `ValueError` if the expression has another number of distinct placements.
     placements(3, "ie,jke->ijk", F, S) is F_ie S_jke + F_je S_ike + F_ke S_ije.
@@ -37,7 +38,7 @@ def placements(number: int, subscripts: str, *operands: Tensor) -> Tensor:
     distinct = {_signature(placed, output): placed for placed in _permuted(factors, output)}
     if len(distinct) != number:
         raise ValueError(f"{number}{{{subscripts}}} has {len(distinct)} distinct placements")
-    return _evaluate(list(distinct.values()), output, (tuple(range(len(output))),))
+    return _evaluate(list(distinct.values()), output, (tuple(range(len(output))),), times)
 
 
 def _parse(subscripts: str, operands: Sequence[Tensor]) -> tuple[Factors, str]:
@@ -96,7 +97,7 @@ def _declared(sym: str, output: str) -> Groups:
     return tuple(sorted(together + alone))
 
 
-def _evaluate(expressions: Sequence[Factors], output: str, symmetry: Groups) -> Tensor:
+def _evaluate(expressions: Sequence[Factors], output: str, symmetry: Groups, times: float) -> Tensor:
     extents = {
         letter: size
         for word, tensor, _ in expressions[0]
@@ -114,7 +115,7 @@ def _evaluate(expressions: Sequence[Factors], output: str, symmetry: Groups) -> 
                 extents,
                 monomials,
             )
-        entries[index] = _sum(monomials, {place: tensor for _, tensor, place in expressions[0]})
+        entries[index] = _sum(monomials, times, {place: tensor for _, tensor, place in expressions[0]})
     return Tensor(shape, symmetry, entries)
 
 
@@ -134,11 +135,11 @@ def _collect(
             into[tuple(sorted(monomial))] += 1
 
 
-def _sum(monomials: Counter, tensors: dict[int, Tensor]) -> Scalar:
+def _sum(monomials: Counter, times: float, tensors: dict[int, Tensor]) -> Scalar:
     total: Scalar = 0.0
     for monomial, count in monomials.items():
         entries = [tensors[key].entries[index] for key, index in monomial]
-        coefficient = reduce(multiply, filter(is_known, entries), float(count))
+        coefficient = reduce(multiply, filter(is_known, entries), times * count)
         unknown = [entry for entry in entries if not is_known(entry)]
         total = add(total, multiply(coefficient, reduce(multiply, unknown, 1.0)))
     return total

@@ -92,6 +92,7 @@ class _Walk:
         self.nodes: list[Scalar] = []
         self.known: dict[Any, int] = {}
         self.formed: dict[Any, int] = {}
+        self.multiples: dict[int, tuple[float, int]] = {}  # node -> known factor, node that it multiplies
 
     def node(self, scalar: Scalar) -> int:
         """The number of a scalar; equal known ones share it."""
@@ -142,8 +143,23 @@ class _Walk:
     def operation(self, key: Any, function: Callable[..., Scalar], numbers: tuple[int, ...]) -> int:
         """The node that an operation on nodes gives, formed once."""
         if (key, numbers) not in self.formed:
-            self.formed[key, numbers] = self.node(function(*(self.nodes[number] for number in numbers)))
+            result = None if key != "mul" else self.multiple(*numbers)
+            if result is None:
+                result = self.node(function(*(self.nodes[number] for number in numbers)))
+            self.formed[key, numbers] = result
         return self.formed[key, numbers]
+
+    def multiple(self, a: int, b: int) -> int | None:
+        """The product of a known number and a node, known factors gathered: c1 (c2 x) is (c1 c2) x."""
+        if is_known(self.nodes[b]):
+            a, b = b, a
+        known = self.nodes[a]
+        if not is_known(known) or is_known(self.nodes[b]) or known == 0:
+            return None
+        factor, base = self.multiples.get(b, (1.0, b))
+        result = self.node(multiply(known * factor, self.nodes[base]))
+        self.multiples.setdefault(result, (known * factor, base))
+        return result
 
     def each(self, key: Any, function: Callable[..., Scalar], operands: Sequence[Nodes]) -> Nodes:
         """An operation on each tuple of elements, operands broadcast against each other."""

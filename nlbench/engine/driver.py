@@ -192,7 +192,7 @@ def _write(
         block=problem.block,
         precision=experiment.engine.precision,
         threads=threads,
-        units=dict(zip(problem.layout.coordinates, problem.layout.units, strict=True)),
+        units=dict(zip(problem.layout.magnitudes, problem.layout.magnitude_units, strict=True)),
         versions=versions(),
         commit=commit(),
         device=_device(),

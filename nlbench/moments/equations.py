@@ -65,9 +65,8 @@ def _covariance(f: Taylor, D: Taylor | None, B: Tensor | None, P: Tensor) -> Ten
 
 def _third(f: Taylor, D: Taylor | None, moments: Components) -> Tensor:
     P, S, k4 = moments.cov, moments.third, moments.fourth
-    rate = placements(3, "ie,jke->ijk", f.first, S) + 2.0 * placements(
-        3, "ijk->ijk", _twice(f.second, P)
-    )  # (3)
+    rate = placements(3, "ie,jke->ijk", f.first, S)  # (3)
+    rate = rate + placements(3, "ijk->ijk", _twice(f.second, P), times=2.0)
     if k4 is not None:
         rate = rate + placements(3, "ief,jkef->ijk", f.second, k4)
     if D is None:
@@ -89,4 +88,4 @@ def _fourth(f: Taylor, D: Taylor | None, a: Tensor, B: Tensor, moments: Componen
         return rate
     rate = rate + placements(6, "ijp,klp->ijkl", D.first, S) + placements(6, "ijpq,klpq->ijkl", D.second, k4)
     half = einsum("ijpq,kp->ijkq", D.second, P, sym="ij")
-    return rate + 2.0 * placements(6, "ijkl->ijkl", einsum("ijkq,lq->ijkl", half, P, sym="ij,kl"))
+    return rate + placements(6, "ijkl->ijkl", einsum("ijkq,lq->ijkl", half, P, sym="ij,kl"), times=2.0)

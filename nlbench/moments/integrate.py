@@ -17,9 +17,10 @@ import jax.numpy as jnp
 State = Any  # a pytree of arrays
 Field = Callable[[Any, State], State]  # (t, y) -> dy/dt
 
-LOOP_ABOVE = (
-    8  # components; above it XLA would recompute a stage in each of its consumers unless stages are a loop
-)
+# Numbers of components. From the first on, recomputing the early stages costs more than keeping them; above the second,
+# stages as a loop are faster to compile and to run.
+KEEP_FROM = 3
+LOOP_ABOVE = 8
 
 
 class StagedRK4(diffrax.AbstractSolver):
@@ -58,22 +59,35 @@ class StagedRK4(diffrax.AbstractSolver):
 
 
 def _unrolled_step(field: Field, t: Any, h: Any, y: State) -> State:
+    """Stages in a row. XLA forms each component of the result by itself and recomputes most stages for each; with
+    several components it is made to keep the first two, by a loop whose single turn it cannot foresee."""
+
+    def second(k1: State) -> State:
+        return field(t + h / 2, _moved(y, h / 2, k1))
+
     k1 = field(t, y)
-    k2 = field(t + h / 2, _moved(y, h / 2, k1))
+    if len(jax.tree.leaves(y)) < KEEP_FROM:
+        k2 = second(k1)
+    else:
+        once = jnp.where(t == t, 1, 0)
+        k1, k2 = jax.lax.fori_loop(0, once, lambda _, k: (k[0], second(k[0])), (k1, k1))
     k3 = field(t + h / 2, _moved(y, h / 2, k2))
     k4 = field(t + h, _moved(y, h, k3))
     return jax.tree.map(lambda y, a, b, c, d: y + h / 6 * (a + 2 * (b + c) + d), y, k1, k2, k3, k4)
 
 
 def _looped_step(field: Field, t: Any, h: Any, y: State) -> State:
-    def stage(s: Any, carry: tuple[State, State]) -> tuple[State, State]:
-        point, total = carry
-        k = field(t + h * jnp.where(s == 0, 0.0, jnp.where(s == 3, 1.0, 0.5)), point)
-        following = h * jnp.where(s == 2, 1.0, 0.5)  # unused after the last stage
-        weight = h * jnp.where((s == 0) | (s == 3), 1 / 6, 1 / 3)
-        return _moved(y, following, k), _moved(total, weight, k)
+    """Stages 2 to 4 as a loop. The sum takes in the slope of the stage before, which is at hand and so not formed
+    again for it."""
 
-    return jax.lax.fori_loop(0, 4, stage, (y, y))[1]
+    def stage(s: Any, carry: tuple[State, State]) -> tuple[State, State]:
+        k, total = carry
+        ahead = h * jnp.where(s == 2, 1.0, 0.5)
+        total = _moved(total, h * jnp.where(s == 0, 1 / 6, 1 / 3), k)
+        return field(t + ahead, _moved(y, ahead, k)), total
+
+    k, total = jax.lax.fori_loop(0, 3, stage, (field(t, y), y))
+    return _moved(total, h / 6, k)
 
 
 def _moved(y: State, h: Any, k: State) -> State:
