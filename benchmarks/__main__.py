@@ -39,6 +39,7 @@ def main() -> None:
         ours.third_order,
         rows.plain_third_order,
         rows.c_experiment,
+        ours.simulated,
         ours.engine,
     ]
     libraries = [ours.ekf, rows.plain_ekf, peers.dynamax, peers.filterpy]

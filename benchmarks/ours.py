@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -35,28 +36,57 @@ def ekf(workload: Workload, y: np.ndarray) -> Row:
     return _filter_row(workload, y, nb.filters.build("ekf", system, missing=False))
 
 
+def simulated(workload: Workload, y: np.ndarray) -> Row:
+    """What the C kernel with random numbers does: truth and measurements of its own, third-order filter, no tables."""
+    import jax
+    import jax.numpy as jnp
+
+    from nlbench.engine import block, follow
+
+    stated = _problem(workload)
+    chunk = block.make_chunk(stated, 0, workload.blocks, workload.blocks, workload.trajectories)
+
+    def one(lanes: Any) -> Any:
+        states, measurements = block.trajectories(stated, block.words(SEED), lanes)
+        followed = follow.follow(stated.runners[0], stated.schedule, measurements, LANES)
+        return jnp.sum(states, axis=0), jnp.sum(followed.components, axis=0)
+
+    begun = time.perf_counter()
+    program = jax.jit(lambda lanes: jax.lax.map(one, lanes)).lower(chunk.lanes).compile()
+    seconds = time.perf_counter() - begun
+    call = lambda: jax.block_until_ready(program(chunk.lanes))  # noqa: E731
+    return Row("nlbench, with random numbers and truth", call, workload.work, seconds)
+
+
 def engine(workload: Workload, y: np.ndarray) -> Row:
     """All that a run computes, on data of its own: random numbers, truth, third-order filter, statistics."""
-    from nlbench import config
-    from nlbench.engine import compiled, problem
+    from nlbench.engine import compiled
 
-    end, interval = workload.step * workload.steps * workload.times, workload.step * workload.steps
-    experiment = config.from_dict(
-        {
-            "experiment": "benchmark/whole-engine",
-            "system": {"name": "culver-scalar"},
-            "filters": ["third-order"],
-            "time": {"end": round(end, 12), "step": workload.step, "output": round(interval, 12)},
-            "monte_carlo": {"runs": workload.trajectories, "seed": SEED},
-        }
-    )
-    made = compiled.compile_chunks(problem.make(experiment), SEED)
+    made = compiled.compile_chunks(_problem(workload), SEED)
 
     def call() -> Any:
         return made.sums(0, workload.blocks, workload.trajectories)
 
-    call()
     return Row("nlbench, whole engine", call, workload.work, made.seconds)
+
+
+def _problem(workload: Workload) -> Any:
+    """The workload as an experiment states it."""
+    from nlbench import config
+    from nlbench.engine import problem
+
+    end, interval = workload.step * workload.steps * workload.times, workload.step * workload.steps
+    return problem.make(
+        config.from_dict(
+            {
+                "experiment": "benchmark/whole-engine",
+                "system": {"name": "culver-scalar"},
+                "filters": ["third-order"],
+                "time": {"end": round(end, 12), "step": workload.step, "output": round(interval, 12)},
+                "monte_carlo": {"runs": workload.trajectories, "seed": SEED},
+            }
+        )
+    )
 
 
 def _filter_row(workload: Workload, y: np.ndarray, ours: Any) -> Row:
