@@ -1,16 +1,13 @@
-"""What holds for all tests: double precision; with NLBENCH_TYPES=1, shapes and types are enforced."""
+"""What holds for all tests: shapes and types are enforced, and numbers are double precision."""
 
 from __future__ import annotations
 
-import os
+from jaxtyping import install_import_hook
 
-if os.environ.get("NLBENCH_TYPES") == "1":
-    from jaxtyping import install_import_hook
+# Before anything of nlbench is imported: the hook decorates every function of these packages.
+NUMERICAL = "algebra engine filters moments references simulate statistics systems updates"
+install_import_hook([f"nlbench.{package}" for package in NUMERICAL.split()], "beartype.beartype")
 
-    # Before anything of nlbench is imported: the hook decorates every function of these packages.
-    numerical = "algebra engine filters moments references simulate statistics systems updates"
-    install_import_hook([f"nlbench.{package}" for package in numerical.split()], "beartype.beartype")
-
-import jax
+import jax  # noqa: E402 - the hook comes first
 
 jax.config.update("jax_enable_x64", True)

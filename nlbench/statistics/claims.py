@@ -10,7 +10,7 @@ supports the claim least, with its own 95 % interval.
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import pandas as pd
 
@@ -20,6 +20,7 @@ LEVEL = 0.05
 COLUMNS = ("id", "says", "verdict", "estimate", "low", "high", "n")
 
 
+@runtime_checkable
 class Claim(Protocol):
     """What is needed of a claim of the experiment file."""
 

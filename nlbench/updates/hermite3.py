@@ -51,7 +51,7 @@ def hermite3(prior: Components, gain: Gain, z: Tensor, clipped: Tensor) -> Poste
     nu, phi, psi, N = terms(prior.third, gain, clipped)
     mean = prior.mean + einsum("ir,r->i", gain.K, z) + phi
     cov = gain.omega + psi - einsum("i,j->ij", phi, phi)
-    third = N - placements(3, "i,jk->ijk", phi, psi) + 2.0 * einsum("i,j,k->ijk", phi, phi, phi)
+    third = N - placements(3, "i,jk->ijk", phi, psi) + einsum("i,j,k->ijk", phi, phi, phi, times=2.0)
     return Posterior(Components(mean, cov, third), nu)
 
 

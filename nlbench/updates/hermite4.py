@@ -45,7 +45,7 @@ def hermite4(prior: Components, gain: Gain, z: Tensor, clipped: Tensor) -> Poste
     a1, a2, a3, a4 = (kappa * through_gain(gain.G, A) for A in (A1, A2, A3, k4))  # (4)
     mean = prior.mean + einsum("ir,r->i", gain.K, z) + a1  # (5)
     cov = gain.omega + a2 - einsum("i,j->ij", a1, a1)
-    third = a3 - placements(3, "i,jk->ijk", a1, a2) + 2.0 * einsum("i,j,k->ijk", a1, a1, a1)
+    third = a3 - placements(3, "i,jk->ijk", a1, a2) + einsum("i,j,k->ijk", a1, a1, a1, times=2.0)
     k4 = a4 - placements(4, "i,jkl->ijkl", a1, a3) - placements(3, "ij,kl->ijkl", a2, a2)  # (6)
     k4 = k4 + 2.0 * placements(6, "i,j,kl->ijkl", a1, a1, a2) - 6.0 * einsum("i,j,k,l->ijkl", a1, a1, a1, a1)
     return Posterior(Components(mean, cov, third, k4), nu)

@@ -206,6 +206,7 @@ def test_a_killed_process_leaves_no_lock(tmp_path):
     process = holder(tmp_path)
     process.kill()
     process.communicate()
+    (tmp_path / ".lock").write_text("what an earlier holder wrote " * 9)
     with RunFolder(tmp_path).locked():
         assert json.loads((tmp_path / ".lock").read_text())["pid"] == os.getpid()
 

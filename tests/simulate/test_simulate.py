@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 import nlbench as nb
 from nlbench import simulate as sim
 from nlbench.schedule import make
+from nlbench.systems.system import Sets
 from tests.oracle_culver import flow
 
 
@@ -238,6 +239,24 @@ def test_members_of_a_thesis_set_share_their_correction(first):
     assert len(set(members)) == 80
     assert x.mean() == pytest.approx(2.0, abs=1e-13)
     assert ((x - 2) ** 2).mean() == pytest.approx(0.16, abs=1e-13)
+
+
+@pytest.mark.parametrize("first", [0, 2**32 - 3])
+def test_every_member_of_a_set_draws_under_its_own_number(first):
+    """Also past 2^32, where the low word starts again from zero and the high word must be carried."""
+    system = nb.System(
+        drift=lambda t, x: 0 * x,
+        observe=lambda t, x: x,
+        measurement_cov=np.eye(1),
+        initial=nb.Moments(np.zeros(1), np.eye(1)),
+        sample=Sets(6, lambda normals: normals),
+    )
+    for member in range(6):
+        number = first + member
+        words = [number >> 32, number & 0xFFFFFFFF, first >> 32, first & 0xFFFFFFFF]
+        n = sim.Trajectory(*map(jnp.uint32, words), jnp.int32(member))
+        own = sim.trajectory_key(key(), n.high, n.low, sim.INITIAL)
+        np.testing.assert_array_equal(sim.initial_state(system, key(), n), jax.random.normal(own, (1,)))
 
 
 def test_no_measurements_means_none_taken():

@@ -124,6 +124,12 @@ def test_without_a_guard_nothing_is_counted():
     assert bool(updated("third-order", system, y, guard="sub1")[1].guarded)
 
 
+@pytest.mark.parametrize("name", GUARDED)
+def test_a_state_that_is_lost_already_is_not_counted_as_guarded(name):
+    system = linear_measurement([np.nan], np.eye(1), np.eye(1), np.eye(1), [[[0.1]]])
+    assert not bool(updated(name, system, np.ones(1))[1].guarded)
+
+
 def two_measurements(seed=0):
     g = rng(seed)
     cov = random_cov(g, 2)

@@ -1,0 +1,54 @@
+"""Figures of a run, drawn from its saved tables: SVG and PNG files in the run's folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nlbench.errors import ConfigError
+from nlbench.figures import style
+from nlbench.figures.data import Data, read
+from nlbench.figures.divergence import divergence
+from nlbench.figures.error_curves import mean_error, rms, rms_clipped
+from nlbench.figures.moment_curves import third_moment, variance
+from nlbench.figures.picture import Picture, png, settle, svg
+from nlbench.results.atomic import atomic_write, remove
+
+if TYPE_CHECKING:
+    from nlbench.results.results import Results
+
+FIGURES: dict[str, Callable[[Data], Iterator[Picture]]] = {
+    "rms": rms,
+    "rms_clipped": rms_clipped,
+    "mean_error": mean_error,
+    "variance": variance,
+    "third_moment": third_moment,
+    "divergence": divergence,
+}
+
+
+def draw(results: Results, names: Sequence[str] | None = None) -> list[Path]:
+    """Draw the figures of a run into its folder `figures/`, as SVG and PNG. Returns the paths written.
+
+    `names` are keys of `FIGURES`; by default those that the experiment asks for, or all that its tables allow.
+    Pictures of the same kinds that the run no longer has are removed. Raises `ConfigError` for an unknown name.
+    """
+    names = names or results.experiment.figures or tuple(FIGURES)
+    unknown = [name for name in names if name not in FIGURES]
+    if unknown:
+        raise ConfigError(f"unknown figure {', '.join(map(repr, unknown))}; known: {', '.join(FIGURES)}")
+    folder = results.path / "figures"
+    data = read(results)
+    written = []
+    for name in names:
+        with style.context(salt=name):
+            for picture in map(settle, FIGURES[name](data)):
+                for suffix, content in (("svg", svg(picture)), ("png", png(picture))):
+                    path = folder / f"{picture.file_name}.{suffix}"
+                    atomic_write(path, content)
+                    written.append(path)
+    for path in sorted(folder.glob("*")):
+        if path.stem.split("-")[0] in names and path not in written:
+            remove(path)
+    return written

@@ -1,0 +1,93 @@
+"""What the figures need of a run, read once from its saved tables."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+if TYPE_CHECKING:
+    from nlbench.results.results import Results
+
+
+class Curve(NamedTuple):
+    """A statistic against time, with its standard error and the number of runs behind each point."""
+
+    time: np.ndarray
+    value: np.ndarray
+    stderr: np.ndarray
+    n: np.ndarray
+
+
+class Data(NamedTuple):
+    """Curves and tables of a run. `baseline` is the filter that others are drawn relative to."""
+
+    filters: tuple[str, ...]
+    baseline: str
+    reference: str | None
+    units: dict[str, str]
+    source_runs: int | None
+    runs: int
+    curves: dict[tuple[str, str, str], Curve]
+    paired: pd.DataFrame
+    divergence: pd.DataFrame
+
+    def coordinates(self, statistic: str) -> tuple[str, ...]:
+        """Coordinates (and named norms) for which the statistic was saved at more than one time, in table order."""
+        found = (c for (_, c, s), curve in self.curves.items() if s == statistic and len(curve.time) > 1)
+        return tuple(dict.fromkeys(found))
+
+    def curve(self, label: str, coordinate: str, statistic: str) -> Curve:
+        """The curve of a filter; empty where the table has none."""
+        nothing = np.empty(0)
+        return self.curves.get((label, coordinate, statistic), Curve(nothing, nothing, nothing, nothing))
+
+    @property
+    def any_diverged(self) -> bool:
+        """Whether any filter lost a run."""
+        return bool((self.divergence["diverged"] > 0).any())
+
+
+def read(results: Results) -> Data:
+    """The data of a results folder."""
+    statistics = results.table("statistics")
+    experiment = results.experiment
+    filters = tuple(dict.fromkeys(statistics["filter"]))
+    reference = experiment.reference if experiment.reference in filters else None
+    curves = _curves(statistics)
+    return Data(
+        filters=filters,
+        baseline=reference or _best(filters, curves),
+        reference=reference,
+        units=units(results),
+        source_runs=experiment.source.runs,
+        runs=results.manifest["runs"],
+        curves=curves,
+        paired=results.table("paired"),
+        divergence=results.table("divergence"),
+    )
+
+
+def units(results: Results) -> dict[str, str]:
+    """Unit of each coordinate and of `time`; empty for none."""
+    return {"time": "s", **results.manifest.get("units", {})}
+
+
+def _curves(statistics: pd.DataFrame) -> dict[tuple[str, str, str], Curve]:
+    time = pd.to_numeric(statistics["time"], errors="coerce")
+    dated = statistics.assign(time=time).dropna(subset="time")
+    groups = dated.groupby(["filter", "coordinate", "statistic"], sort=False)
+    columns = ("time", "value", "stderr", "n")
+    return {
+        key: Curve(*(rows.sort_values("time")[column].to_numpy(float) for column in columns))
+        for key, rows in groups
+    }
+
+
+def _best(filters: tuple[str, ...], curves: dict[tuple[str, str, str], Curve]) -> str:
+    """Without a reference: the filter whose clipped RMS error ends lowest (in the first coordinate)."""
+    final = {
+        f: c.value[-1] for (f, _, s), c in reversed(curves.items()) if s == "rms_clipped" and len(c.value)
+    }
+    return min(filters, key=lambda f: np.nan_to_num(final.get(f, np.inf), nan=np.inf))

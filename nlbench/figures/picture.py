@@ -1,0 +1,65 @@
+"""A finished figure with its title and description, as SVG and PNG bytes that depend on nothing but the data."""
+
+from __future__ import annotations
+
+import re
+from html import escape
+from io import BytesIO
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NO_METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}
+ROOT_STYLE = (
+    "stroke-linejoin:round;stroke-linecap:butt"  # what matplotlib puts into a style element for every `*`
+)
+
+
+class Picture(NamedTuple):
+    """A figure with `name`, the kind, `-` and the coordinate. `description` is for those who cannot see it."""
+
+    name: str
+    title: str
+    description: str
+    figure: Figure
+
+    @property
+    def file_name(self) -> str:
+        """The name without characters that mean something in a path, a link or an identifier."""
+        return re.sub(r"[^A-Za-z0-9_.-]", "_", self.name)
+
+
+def settle(picture: Picture) -> Picture:
+    """The picture with its layout computed once, for all formats."""
+    picture.figure.draw_without_rendering()
+    picture.figure.set_layout_engine("none")
+    return picture
+
+
+def png(picture: Picture) -> bytes:
+    """The picture as PNG, without the version of the software that drew it."""
+    buffer = BytesIO()
+    picture.figure.savefig(buffer, format="png", dpi="figure", metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def svg(picture: Picture) -> bytes:
+    """The picture as SVG with title, description and role, fit to stand alone or beside others in one page.
+
+    Identifiers carry the picture's name, and no style element speaks about the rest of the page.
+    """
+    buffer = BytesIO()
+    picture.figure.savefig(buffer, format="svg", metadata=NO_METADATA)
+    text = buffer.getvalue().decode()
+    text = re.sub(
+        r"<defs>\s*<style type=\"text/css\">.*?</style>\s*</defs>\s*", "", text, count=1, flags=re.DOTALL
+    )
+    text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL)
+    text = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{picture.file_name}-", text)
+    names = f"{picture.file_name}-title {picture.file_name}-desc"
+    text = text.replace("<svg ", f'<svg role="img" aria-labelledby="{names}" style="{ROOT_STYLE}" ', 1)
+    head = f'<title id="{picture.file_name}-title">{escape(picture.title)}</title>\n'
+    head += f'<desc id="{picture.file_name}-desc">{escape(picture.description)}</desc>\n'
+    start = text.index(">", text.index("<svg ")) + 1
+    return (text[:start] + "\n" + head + text[start:].lstrip("\n")).encode()
