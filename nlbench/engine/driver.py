@@ -114,8 +114,7 @@ def _compute(
     report(totals.runs, runs)
     with stop_requests() as stopped:
         for first, sums in _in_order(compiled, totals.blocks, whole, runs, threads, chunk, stopped):
-            for place in range(len(sums["total"])):
-                totals.add(first + place, {name: value[place] for name, value in sums.items()})
+            totals.add(first, sums)
             report(totals.runs, runs)
             if time.monotonic() - saved_at > SECONDS_BETWEEN_CHECKPOINTS:
                 _checkpoint(folder, compiled, totals)
@@ -128,8 +127,7 @@ def _compute(
             )
     if rest:
         totals = totals.copy()
-        sums = compiled.sums(whole, 1, runs)
-        totals.add(whole, {name: value[0] for name, value in sums.items()})
+        totals.add(whole, compiled.sums(whole, 1, runs))
         report(runs, runs)
     return totals
 

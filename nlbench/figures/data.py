@@ -43,6 +43,12 @@ class Data(NamedTuple):
         nothing = np.empty(0)
         return self.curves.get((label, coordinate, statistic), Curve(nothing, nothing, nothing, nothing))
 
+    def at(self, label: str, coordinate: str, statistic: str, time: float) -> tuple[float, float]:
+        """Value and standard error at a time; NaN where the table has none."""
+        curve = self.curve(label, coordinate, statistic)
+        here = np.flatnonzero(np.abs(curve.time - time) < 1e-9)
+        return (float(curve.value[here[0]]), float(curve.stderr[here[0]])) if here.size else (np.nan, np.nan)
+
     @property
     def any_diverged(self) -> bool:
         """Whether any filter lost a run."""

@@ -20,6 +20,12 @@ _ALWAYS_KEPT = 64 * JACKKNIFE_GROUPS  # so that with fewer groups the errors of 
 _PREFIX = "group_"
 
 
+def _in_a_row(array: np.ndarray) -> np.ndarray:
+    """(B, ..., L) of blocks as (..., B L): their runs in a row."""
+    moved = np.moveaxis(array, 0, -2)
+    return moved.reshape(*moved.shape[:-2], -1)
+
+
 class Totals:
     """Sums per group, histograms of |error| and kept errors; grows only by `add`."""
 
@@ -42,60 +48,82 @@ class Totals:
         self._pairs, self._triples = np.array(pairs).T, np.array(triples).T
         self._rest = np.array([[pairs.index(t[:gone] + t[gone + 1 :]) for t in triples] for gone in range(3)])
 
-    def add(self, block: int, sums: Mapping[str, Any]) -> None:
-        """Add the sums of block number `block`, which must be the next one."""
-        if block != self.blocks:
+    def add(self, first: int, sums: Mapping[str, Any]) -> None:
+        """Add the sums of blocks first, first + 1, ..., stacked along a leading axis; `first` must be the next block.
+
+        The result is the same, to the last bit, however the blocks are split over calls.
+        """
+        if first != self.blocks:
             raise ValueError(
-                f"block {block} came when block {self.blocks} was due: blocks are added in order"
+                f"block {first} came when block {self.blocks} was due: blocks are added in order"
             )
-        if self._padded:
-            raise ValueError(f"block {block - 1} was padded: add a padded block to a copy of the totals only")
-        host = {name: np.asarray(value) for name, value in sums.items()}
+        count = len(sums["total"])
+        for start in range(0, count, GROUPS):  # no two blocks of a part are of the same group
+            self._add({name: np.asarray(value)[start : start + GROUPS] for name, value in sums.items()})
+
+    def _add(self, host: dict[str, np.ndarray]) -> None:
         error, lost = host.pop("report_error"), host.pop("report_diverged")
-        count = int(host["total"])
+        real, lanes = host["total"], lost.shape[-1]
+        if self._padded or (real[:-1] < lanes).any():
+            raise ValueError(
+                "a block after a padded one: add a padded block last, and to a copy of the totals only"
+            )
         moved = self._move_to_pivot(host)
         if not self.groups:
-            self.groups = {name: np.zeros((GROUPS, *value.shape)) for name, value in moved.items()}
+            self.groups = {name: np.zeros((GROUPS, *value.shape[1:])) for name, value in moved.items()}
+        group = (self.blocks + np.arange(len(real))) % GROUPS
         for name, value in moved.items():
-            self.groups[name][block % GROUPS] += value
-        self._add_runs(error[..., :count].astype(np.float64), lost[..., :count])
-        self.blocks += 1
-        self.runs += count
-        self._padded = count < lost.shape[-1]
+            self.groups[name][group] += value
+        runs = int(real.sum())
+        self._add_runs(*(_in_a_row(array)[..., :runs] for array in (error.astype(np.float64), lost)))
+        self.blocks += len(real)
+        self.runs += runs
+        self._padded = bool(real[-1] < lanes)
 
     def _move_to_pivot(self, sums: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """The block's sums with all powers of error, variance and third about the pivot."""
+        """The blocks' sums with all powers of error, variance and third about the pivot."""
         mean, power = sums.pop("mean").astype(np.float64), sums.pop("power")
         alive = sums["alive"][..., None].astype(np.float64)
-        if not self._pivot_set.all():
-            fresh = ~self._pivot_set & (sums["alive"] > 0)
-            self.pivot[:, fresh] = mean[:, fresh]
+        for block in range(len(mean)):
+            if self._pivot_set.all():
+                break
+            fresh = ~self._pivot_set & (sums["alive"][block] > 0)
+            self.pivot[:, fresh] = mean[block][:, fresh]
             self._pivot_set |= fresh
-        shift = np.where(alive > 0, mean - self.pivot, 0.0)
-        about = np.zeros((7, *power.shape[1:]))  # sums of d^0 ... d^6; that of d is zero about the mean
-        about[0], about[2:] = alive, power
-        first = alive * shift[1:]
-        cross = self._move_cross(sums, shift[0][:, self._reports], alive[:, self._reports])
-        power = shifted(about, shift[0])[1:]
-        return {**sums, "power": power, "first": first, "spread": sums["spread"] + first * shift[1:], **cross}
+        shift = np.where(alive[:, None] > 0, mean - self.pivot, 0.0)
+        about = np.zeros(
+            (7, len(mean), *power.shape[2:])
+        )  # sums of d^0 ... d^6; that of d is zero about the mean
+        about[0], about[2:] = alive, np.moveaxis(power, 1, 0)
+        first = alive[:, None] * shift[:, 1:]
+        cross = self._move_cross(sums, shift[:, 0][:, :, self._reports], alive[:, :, self._reports])
+        power = np.moveaxis(shifted(about, shift[:, 0])[1:], 0, 1)
+        return {
+            **sums,
+            "power": power,
+            "first": first,
+            "spread": sums["spread"] + first * shift[:, 1:],
+            **cross,
+        }
 
     def _move_cross(
         self, sums: dict[str, np.ndarray], shift: np.ndarray, alive: np.ndarray
     ) -> dict[str, np.ndarray]:
-        """Joint sums, s being the shift: S_ij + n s_i s_j, and S_ijk + 3 {s_i S_jk} + n s_i s_j s_k."""
+        """Joint sums about the pivot: S_ij + n s_i s_j, and S_ijk + s_i S_jk + s_j S_ik + s_k S_ij + n s_i s_j s_k."""
         i, j = self._pairs
-        factors = shift[:, :, self._triples]
+        factors = shift[..., self._triples]
         second = sums["cross_second"].astype(np.float64)
-        third = sums["cross_third"] + (factors * second[:, :, self._rest]).sum(2)
+        third = sums["cross_third"] + (factors * second[..., self._rest]).sum(-2)
         return {
-            "cross_second": second + alive * shift[:, :, i] * shift[:, :, j],
-            "cross_third": third + alive * factors.prod(2),
+            "cross_second": second + alive * shift[..., i] * shift[..., j],
+            "cross_third": third + alive * factors.prod(-2),
         }
 
     def _add_runs(self, error: np.ndarray, lost: np.ndarray) -> None:
         size = np.where(lost[:, :, None], np.inf, magnitudes(error, self.layout) / self._scale)
         bins = histogram.bin_of(size) + self._bin_offset
-        np.add.at(self.histogram.reshape(-1), bins.ravel(), 1)
+        flat = self.histogram.reshape(-1)
+        flat += np.bincount(bins.ravel(), minlength=flat.size)
         self.kept.add(error, lost)
 
     @property

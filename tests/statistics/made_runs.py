@@ -105,11 +105,16 @@ def block_sums(tracks: Tracks, mask: np.ndarray, layout: Layout) -> dict[str, ja
     return _COMPILED[repr(layout)](tracks, mask)
 
 
+def stacked(sums: list[dict]) -> dict[str, np.ndarray]:
+    """Sums of several blocks along a leading axis, as the engine hands them over."""
+    return {name: np.stack([np.asarray(block[name]) for block in sums]) for name in sums[0]}
+
+
 def total(runs: Runs, layout: Layout) -> Totals:
     """Totals over all blocks."""
     totals = Totals(layout)
     for number, block in enumerate(blocks(runs)):
-        totals.add(number, block_sums(*block, layout))
+        totals.add(number, stacked([block_sums(*block, layout)]))
     return totals
 
 

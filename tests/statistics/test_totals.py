@@ -15,7 +15,7 @@ LAYOUT = made_runs.layout(keep_runs=100)
 @pytest.fixture(scope="module")
 def all_sums():
     runs = made_runs.make(LAYOUT, 64 * 70 + 10, seed=5)
-    return [made_runs.block_sums(*block, LAYOUT) for block in made_runs.blocks(runs)]
+    return [made_runs.stacked([made_runs.block_sums(*block, LAYOUT)]) for block in made_runs.blocks(runs)]
 
 
 def summed(all_sums) -> Totals:
@@ -53,6 +53,21 @@ def test_a_saved_state_goes_on_without_changing_one_bit(all_sums, stop):
     for number in range(stop, len(all_sums)):
         resumed.add(number, all_sums[number])
     assert_same_bits(resumed, summed(all_sums))
+
+
+@pytest.mark.parametrize("size", [2, 7, 64, 71])
+def test_blocks_added_together_give_the_same_bits_as_one_by_one(all_sums, size):
+    together = Totals(LAYOUT)
+    for first in range(0, len(all_sums), size):
+        part = all_sums[first : first + size]
+        together.add(first, {name: np.concatenate([block[name] for block in part]) for name in part[0]})
+    assert_same_bits(together, summed(all_sums))
+
+
+def test_a_padded_block_inside_is_refused(all_sums):
+    both = {name: np.concatenate([all_sums[70][name], all_sums[0][name]]) for name in all_sums[0]}
+    with pytest.raises(ValueError, match="padded"):
+        Totals(LAYOUT).add(0, both)
 
 
 def test_adding_to_a_copy_leaves_the_original_alone(all_sums):
