@@ -10,36 +10,45 @@ __all__ = ["plan", "replay", "run"]
 def run(experiment: Any, out: Any = None, progress: Any = None) -> Any:
     """Run an experiment, or go on with one that was stopped, and return its `Results`.
 
-    experiment: an `Experiment`, a path of an experiment file, or a dict with the keys of one.
+    experiment: an `Experiment`, a path of an experiment file, or a dict with the keys of one, whose `system` may be a
+        `System` of your own.
     out: folder of results (default "results"). progress: called with (runs done, runs in all).
     Raises `ConfigError` before anything is computed, `LockedError` where another process runs the same experiment,
     `EnvironmentFault` for disk and memory, `Interrupted` after Ctrl-C with everything so far saved.
     """
     from nlbench.engine.driver import run
 
-    return run(_experiment(experiment), "results" if out is None else out, progress)
+    return run(*_stated(experiment), "results" if out is None else out, progress)
 
 
 def plan(experiment: Any) -> dict[str, Any]:
     """What a run would cost: blocks, steps, seconds, bytes of memory and of disk."""
     from nlbench.engine.estimate import plan
 
-    return plan(_experiment(experiment))
+    return plan(*_stated(experiment))
 
 
 def replay(experiment: Any, label: str, trajectory: int) -> Any:
     """One trajectory of one filter in full, as a DataFrame, recomputed with its whole block."""
     from nlbench.engine.trace import replay
 
-    return replay(_experiment(experiment), label, trajectory)
+    return replay(*_stated(experiment), label, trajectory)
 
 
-def _experiment(given: Any) -> Any:
+def _stated(given: Any) -> tuple[Any, Any]:
+    """The experiment, and the user's own system if there is one."""
     from nlbench import config, runtime
+    from nlbench.systems.system import System
 
+    own = None
     if isinstance(given, config.Experiment):
         experiment = given
+    elif isinstance(given, dict):
+        if isinstance(given.get("system"), System):
+            own = given["system"]
+            given = {**given, "system": {"name": "own", "interval": own.interval}}
+        experiment = config.from_dict(given)
     else:
-        experiment = config.from_dict(given) if isinstance(given, dict) else config.load(given)
+        experiment = config.load(given)
     runtime.configure(precision=experiment.engine.precision)
-    return experiment
+    return experiment, own

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import jax
 
 from nlbench import runtime
+from nlbench.config.schema import SystemSpec
 from nlbench.engine.compiled import CAPACITY, Compiled, compile_chunks
 from nlbench.engine.cost import cost_table
 from nlbench.engine.interruption import stop_requests
@@ -29,15 +30,22 @@ from nlbench.statistics.totals import Totals
 
 if TYPE_CHECKING:
     from nlbench.config import Experiment
+    from nlbench.systems.system import System
 
 Progress = Callable[[int, int], None]
 SECONDS_BETWEEN_CHECKPOINTS = 5.0
 log = logging.getLogger("nlbench")
 
 
-def run(experiment: Experiment, out: str | Path, progress: Progress | None = None) -> Results:
+def run(
+    experiment: Experiment, own: System | None, out: str | Path, progress: Progress | None = None
+) -> Results:
     """Compute what is missing of an experiment and write its results."""
-    problem = make(experiment)
+    problem = make(experiment, own)
+    compiled = None
+    if own is not None:  # what tells its results from those of another system is the program itself
+        compiled = compile_chunks(problem, experiment.monte_carlo.seed)
+        experiment = _identified(experiment, compiled.program)
     folder = RunFolder(Path(out) / experiment.experiment / experiment.hash12())
     with folder.locked():
         done = _finished_runs(folder)
@@ -47,7 +55,7 @@ def run(experiment: Experiment, out: str | Path, progress: Progress | None = Non
         folder.reopen()
         folder.write_experiment(experiment.resolved_yaml())
         begun = time.perf_counter()
-        compiled = compile_chunks(problem, experiment.monte_carlo.seed)
+        compiled = compiled or compile_chunks(problem, experiment.monte_carlo.seed)
         totals = _resumed(folder, compiled)
         runs = max(runs, totals.runs)
         threads = experiment.engine.threads or runtime.threads()
@@ -57,6 +65,11 @@ def run(experiment: Experiment, out: str | Path, progress: Progress | None = Non
         seconds = time.perf_counter() - begun
         _write(folder, experiment, compiled, totals, seconds, threads)
     return Results(folder.path)
+
+
+def _identified(experiment: Experiment, program: str) -> Experiment:
+    parameters = {**experiment.system.parameters, "program": program}
+    return experiment.model_copy(update={"system": SystemSpec(name="own", parameters=parameters)})
 
 
 def _finished_runs(folder: RunFolder) -> int | None:

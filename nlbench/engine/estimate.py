@@ -12,13 +12,14 @@ from nlbench.statistics.totals import Totals
 
 if TYPE_CHECKING:
     from nlbench.config import Experiment
+    from nlbench.systems.system import System
 
 CALIBRATION_BLOCKS = 16
 
 
-def plan(experiment: Experiment) -> dict[str, Any]:
+def plan(experiment: Experiment, own: System | None = None) -> dict[str, Any]:
     """Runs, blocks, steps, filters; seconds to compile and to run; bytes of memory and disk."""
-    problem = make(experiment)
+    problem = make(experiment, own)
     compiled = compile_chunks(problem, experiment.monte_carlo.seed)
     runs, threads = experiment.monte_carlo.runs, experiment.engine.threads or runtime.threads()
     blocks = -(-runs // problem.block)

@@ -44,12 +44,17 @@ class Problem(NamedTuple):
         return self.truth.sample.size if isinstance(self.truth.sample, Sets) else 1
 
 
-def make(experiment: Experiment) -> Problem:
-    """The problem that an experiment states. Raises `ConfigError` where model and data do not fit each other."""
-    name, parameters = experiment.system.name, experiment.system.parameters
-    truth = systems.build(name, **{**parameters, **experiment.truth})
+def make(experiment: Experiment, own: System | None = None) -> Problem:
+    """The problem that an experiment states, about the user's own system if one is given.
+
+    Raises `ConfigError` where model and data do not fit each other.
+    """
+    truth = own or systems.build(
+        experiment.system.name, **{**experiment.system.parameters, **experiment.truth}
+    )
+    truth = truth.truth or truth
     times = schedule.make(experiment.time.end, experiment.time.step, experiment.time.output, truth.interval)
-    runners = [_runner(experiment, spec, times) for spec in experiment.filters]
+    runners = [_runner(experiment, spec, own, times) for spec in experiment.filters]
     if experiment.reference is not None:
         runners.append(_bound(experiment.reference, experiment.reference, truth, {}, truth.initial, times))
     for runner in runners:
@@ -62,8 +67,8 @@ def make(experiment: Experiment) -> Problem:
     return Problem(truth, tuple(runners), times, _layout(experiment, truth), experiment.engine.block)
 
 
-def _runner(experiment: Experiment, spec: FilterSpec, times: Schedule) -> Runner:
-    system = systems.build(experiment.system.name, **{**experiment.system.parameters, **spec.model})
+def _runner(experiment: Experiment, spec: FilterSpec, own: System | None, times: Schedule) -> Runner:
+    system = own or systems.build(experiment.system.name, **{**experiment.system.parameters, **spec.model})
     initial = _overridden(system.initial, {**experiment.initial, **spec.initial})
     options = {**spec.options, "missing": False}
     return _bound(spec.label, spec.name, system, options, initial, times)
@@ -92,8 +97,13 @@ def _overridden(initial: Moments, given: dict[str, Any]) -> Moments:
     return changed
 
 
+def state_names(n: int) -> list[str]:
+    """Names of the states of a system that names none."""
+    return ["x"] if n == 1 else [f"x{i + 1}" for i in range(n)]
+
+
 def _layout(experiment: Experiment, truth: System) -> Layout:
-    coordinates = truth.coordinates or tuple(Coordinate(f"x{i + 1}") for i in range(truth.states))
+    coordinates = truth.coordinates or tuple(Coordinate(name) for name in state_names(truth.states))
     times, reports = experiment.layout_times()
     return Layout(
         filters=experiment.labels,

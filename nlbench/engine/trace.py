@@ -8,16 +8,17 @@ import numpy as np
 
 from nlbench.checks import known
 from nlbench.engine.compiled import compile_chunks
-from nlbench.engine.problem import make
+from nlbench.engine.problem import make, state_names
 from nlbench.errors import ConfigError
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from nlbench.config import Experiment
+    from nlbench.systems.system import System
 
 
-def replay(experiment: Experiment, label: str, trajectory: int) -> pd.DataFrame:
+def replay(experiment: Experiment, own: System | None, label: str, trajectory: int) -> pd.DataFrame:
     """Output times as rows: truth, mean, variance and third moment of each state, the measurement taken at that time
     (NaN where none was), whether diverged.
 
@@ -28,12 +29,12 @@ def replay(experiment: Experiment, label: str, trajectory: int) -> pd.DataFrame:
     known(label, experiment.labels, what="filter")
     if not 0 <= trajectory < experiment.monte_carlo.runs:
         raise ConfigError(f"trajectory {trajectory} is not one of 0 ... {experiment.monte_carlo.runs - 1}")
-    problem = make(experiment)
+    problem = make(experiment, own)
     compiled = compile_chunks(problem, experiment.monte_carlo.seed)
     view = compiled.view(trajectory)
     number = experiment.labels.index(label)
     n = problem.truth.states
-    names = [f"x{i + 1}" for i in range(n)] if n > 1 else ["x"]
+    names = state_names(n)
     components, layout = view.components[number], problem.layout
     columns: dict[str, Any] = {"time": layout.times}
     for i, name in enumerate(names):

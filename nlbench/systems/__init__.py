@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 MODULES = {
     "culver-scalar": "nlbench.systems.culver_scalar",
+    "own": "nlbench.systems.own",
 }
 
 
