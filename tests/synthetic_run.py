@@ -1,95 +1,117 @@
-"""A run folder as the engine leaves it, with invented numbers: figures and the report are tested on it."""
+"""A run's folder as the engine leaves it, with invented numbers: figures and report are tested on it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-TIMES = np.round(np.arange(0, 2.01, 0.1), 12)
+from nlbench import config
+from nlbench.results.folder import RunFolder
+from nlbench.results.results import Results
+
+TIMES = [round(0.1 * index, 12) for index in range(21)]
 REPORT_TIMES = (1.0, 2.0)
-FILTERS = {"linearised-kalman": 1.30, "second-order": 1.12, "third-order": 1.05, "exact": 1.0}
-
-
-class SyntheticResults:
-    """Behaves as `nlbench.results.results.Results` does, over tables that are given."""
-
-    def __init__(
-        self, path: Path, tables: dict[str, pd.DataFrame], experiment: SimpleNamespace, manifest: dict
-    ):
-        self.path, self.experiment, self.manifest, self._tables = path, experiment, manifest, tables
-        (path / "tables").mkdir(parents=True)
-        for name, table in tables.items():
-            table.to_csv(path / "tables" / f"{name}.csv", index=False)
-
-    def table(self, name: str) -> pd.DataFrame:
-        return self._tables[name]
+FACTORS = {
+    "linearised-kalman": 1.3,
+    "second-order": 1.12,
+    "third-order": 1.001,
+    "third-order-guarded": 1.0,
+    "exact": 0.9,
+}
+POWER = {"rms": 1, "rms_clipped": 1, "mean_error": 1, "variance_estimated": 2, "variance_actual": 2,
+         "third_estimated": 3, "third_actual": 3}  # fmt: skip
 
 
 def results(
-    path: Path,
-    filters: dict[str, float] = FILTERS,
-    coordinates: dict[str, str] = {"x": ""},
-    diverged: dict[str, int] = {},
+    folder: Path,
+    factors: Mapping[str, float] = FACTORS,
+    coordinates: Mapping[str, str] | None = None,
+    diverged: Mapping[str, int] | None = None,
     runs: int = 20_000,
-    extra: dict[str, pd.DataFrame] = {},
-    **experiment: object,
-) -> SyntheticResults:
-    """A run in which the RMS error of each filter is a given multiple of the best one's."""
-    tables = {
-        "statistics": statistics(filters, coordinates, runs),
-        "paired": paired(filters, coordinates, runs),
-        "divergence": divergence(filters, diverged, runs),
-        **extra,
+    tables: Mapping[str, pd.DataFrame] | None = None,
+    question: str = "",
+    **experiment: Any,
+) -> Results:
+    """A finished run in which the RMS error of each filter is a given multiple of the same curve.
+
+    `coordinates` are names with units, `diverged` counts per filter; `tables` replaces tables or adds some;
+    `experiment` are keys of the experiment file.
+    """
+    coordinates = coordinates or {"x": ""}
+    made = {
+        "statistics": statistics(factors, coordinates, runs),
+        "paired": paired(factors, coordinates, runs),
+        "divergence": divergence(factors, diverged or {}, runs),
+        **(tables or {}),
     }
-    return SyntheticResults(
-        path, tables, specification(filters, runs, experiment), manifest(coordinates, runs)
+    run = RunFolder(folder)
+    run.write_experiment(specification(factors, question, experiment).resolved_yaml())
+    run.write_tables(made)
+    run.finish(
+        runs,
+        seed=1969,
+        hash="0123456789ab",
+        units=dict(coordinates),
+        seconds=12.3,
+        finished="2026-01-02T03:04:05+00:00",
+        device="cpu",
+        versions={"jax": "0.10.2"},
+        fingerprint={"xla_flags": "--one --two"},
     )
+    return Results(folder)
 
 
-def statistics(filters: dict[str, float], coordinates: dict[str, str], runs: int) -> pd.DataFrame:
-    rows = []
-    for label, factor in filters.items():
+def specification(
+    factors: Mapping[str, float], question: str, changes: Mapping[str, Any]
+) -> config.Experiment:
+    """An experiment with filters of these labels."""
+    filters = [{"name": "third-order", "label": label} for label in factors if label != "exact"]
+    plain = {
+        "experiment": "tests/synthetic",
+        "system": {"name": "culver-scalar"},
+        "filters": filters,
+        "reference": "exact" if "exact" in factors else None,
+        "time": {"end": 2.0, "step": 0.02, "output": 0.1},
+        "report_times": list(REPORT_TIMES),
+        "source": {"document": "culver-1969", "figures": ["7.18"], "runs": 80},
+        **changes,
+    }
+    return config.from_dict(plain, question)
+
+
+def statistics(factors: Mapping[str, float], coordinates: Mapping[str, str], runs: int) -> pd.DataFrame:
+    """Curves that fall with time; the estimated variance is smaller the worse the filter."""
+    rows: list[tuple] = []
+    for label, factor in factors.items():
         for coordinate in coordinates:
             for time in TIMES:
                 rms = 0.4 * np.exp(-0.8 * time) * factor ** min(time, 1.0)
-                values = {
-                    "rms": rms,
-                    "rms_clipped": 0.98 * rms,
-                    "mean_error": 0.1 * (factor - 1) * time,
-                    "variance_estimated": rms**2 / factor ** (6 * time),
-                    "variance_actual": rms**2,
-                    "third_estimated": 0.3 * rms**3 if label.startswith(("third", "exact")) else 0.0,
-                    "third_actual": 0.4 * rms**3,
-                }
-                rows += [
-                    (label, time, coordinate, name, value, 1.2 * rms / np.sqrt(runs), runs)
-                    for name, value in values.items()
-                ]
-            rows += [
-                (label, time, coordinate, "median_error", 0.5 * np.exp(-time), 0.002, runs)
-                for time in REPORT_TIMES
-            ]
+                for name, power in POWER.items():
+                    value = rms**power / (factor if name.endswith("estimated") else 1.0)
+                    rows.append(
+                        (label, str(time), coordinate, name, value, 0.9 * power * value / runs**0.5, runs)
+                    )
             rows.append((label, "all", coordinate, "rms", 0.3 * factor, 0.002, runs))
+            rows.append((label, "2.0", coordinate, "median_error", 0.1, 0.002, runs))
     return pd.DataFrame(rows, columns=["filter", "time", "coordinate", "statistic", "value", "stderr", "n"])
 
 
-def paired(filters: dict[str, float], coordinates: dict[str, str], runs: int) -> pd.DataFrame:
-    rows = []
-    labels = list(filters)
-    for i, a in enumerate(labels):
-        for b in labels[i + 1 :]:
+def paired(factors: Mapping[str, float], coordinates: Mapping[str, str], runs: int) -> pd.DataFrame:
+    """Differences whose standard error is that of a tenth of the common curve; p-values fall as they grow."""
+    labels, rows = list(factors), []
+    for place, a in enumerate(labels):
+        for b in labels[place + 1 :]:
             for time in REPORT_TIMES:
-                difference = 0.4 * np.exp(-0.8 * time) * (filters[a] - filters[b])
-                stderr = 0.3 / np.sqrt(runs)
-                p = min(1.0, np.exp(-0.5 * (difference / stderr) ** 2))
-                rows += [
-                    (a, b, time, coordinate, statistic, difference, stderr, runs, p)
-                    for coordinate in coordinates
-                    for statistic in ("rms", "rms_clipped")
-                ]
+                scale = 0.4 * np.exp(-0.8 * time)
+                difference, stderr = scale * (factors[a] - factors[b]), scale / (2 * runs) ** 0.5
+                p_value = float(np.exp(-0.5 * (difference / stderr) ** 2))
+                for coordinate in coordinates:
+                    for name in ("rms", "rms_clipped"):
+                        rows.append((a, b, time, coordinate, name, difference, stderr, runs, p_value))
     columns = [
         "filter_a",
         "filter_b",
@@ -104,47 +126,33 @@ def paired(filters: dict[str, float], coordinates: dict[str, str], runs: int) ->
     return pd.DataFrame(rows, columns=columns)
 
 
-def divergence(filters: dict[str, float], diverged: dict[str, int], runs: int) -> pd.DataFrame:
-    rows = []
-    for label in filters:
-        count = diverged.get(label, 0)
-        fraction = count / runs
-        rows.append(
-            (
-                label,
-                runs,
-                count,
-                fraction,
-                0.8 * fraction,
-                1.2 * fraction + 1 / runs,
-                1.5 if count else np.nan,
-                0,
-            )
-        )
-    columns = ["filter", "n", "diverged", "fraction", "low", "high", "first_time_median", "guarded"]
-    return pd.DataFrame(rows, columns=columns)
+def divergence(factors: Mapping[str, float], diverged: Mapping[str, int], runs: int) -> pd.DataFrame:
+    """Counts with an interval about them."""
+    count = np.array([diverged.get(label, 0) for label in factors])
+    return pd.DataFrame(
+        {
+            "filter": list(factors),
+            "n": runs,
+            "diverged": count,
+            "fraction": count / runs,
+            "low": 0.8 * count / runs,
+            "high": (1.2 * count + 4) / runs,
+            "first_time_median": np.where(count > 0, 1.5, np.nan),
+            "guarded": [3 if "guarded" in label else 0 for label in factors],
+            "guarded_fraction": [0.001 if "guarded" in label else 0.0 for label in factors],
+        }
+    )
 
 
-def specification(filters: dict[str, float], runs: int, changes: dict[str, object]) -> SimpleNamespace:
-    base = {
-        "experiment": "tests/synthetic",
-        "question": "Does carrying the third moment pay?",
-        "reference": "exact" if "exact" in filters else None,
-        "report_times": list(REPORT_TIMES),
-        "source": SimpleNamespace(document="culver-1969", figures=["7.18"], tables=[], runs=80),
-        "monte_carlo": SimpleNamespace(runs=runs, seed=1969),
-        "figures": None,
-        **changes,
-    }
-    resolved = {"experiment": base["experiment"], "filters": [{"label": label} for label in filters]}
-    return SimpleNamespace(**base, resolved=lambda: resolved)
+def claims() -> pd.DataFrame:
+    """One claim of each verdict."""
+    rows = [
+        (f"C{index}", f"claim number {index}", verdict, -0.01, -0.02, 0.005, 20_000)
+        for index, verdict in enumerate(("confirmed", "refuted", "undecided"))
+    ]
+    return pd.DataFrame(rows, columns=["id", "says", "verdict", "estimate", "low", "high", "n"])
 
 
-def manifest(coordinates: dict[str, str], runs: int) -> dict:
-    return {
-        "units": dict(coordinates),
-        "runs": runs,
-        "versions": {"nlbench": "0.1.0", "jax": "0.10.2"},
-        "device": "cpu",
-        "seed": 1969,
-    }
+def cost() -> pd.DataFrame:
+    """Cost of one filter."""
+    return pd.DataFrame({"filter": ["third-order"], "ns_per_step": [3.21], "operations_per_step": [125]})

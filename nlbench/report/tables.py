@@ -1,0 +1,162 @@
+"""The tables of the report: what stands in each cell, and by what a column is sorted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import pandas as pd
+
+from nlbench.figures.data import Data
+from nlbench.report.numbers import listed, measured, percent, plain, uncertain
+from nlbench.report.winners import WORDS, Winner
+
+LONG = 30  # letters
+VERDICTS = {"confirmed": "✓ confirmed", "refuted": "✗ refuted", "undecided": "? undecided"}
+COST = {
+    "filter": "filter",
+    "ns_per_step": "time per run and step (ns)",
+    "compile_seconds": "time to compile (s)",
+    "operations_per_step": "operations per step",
+    "operations_per_update": "operations per update",
+}
+
+
+class Cell(NamedTuple):
+    """Text, the value to sort by, and a class for the style sheet."""
+
+    text: str
+    key: float | str
+    kind: str = ""
+
+
+class Table(NamedTuple):
+    """A table with its caption; the first cell of a row is its heading."""
+
+    name: str
+    caption: str
+    columns: list[str]
+    rows: list[list[Cell]]
+
+
+def name(text: str) -> Cell:
+    """A cell of a name, which stays on one line unless it is long."""
+    return Cell(text, text, "name" if len(text) <= LONG else "long")
+
+
+def prose(text: str) -> Cell:
+    """A cell of words that needs some width."""
+    return Cell(text, text, "prose")
+
+
+def number(text: str, key: float) -> Cell:
+    """A cell of a number; what is not a number sorts last."""
+    return Cell(text, "" if math.isnan(key) else float(key), "number")
+
+
+def errors(data: Data, statistic: str, times: Iterable[float]) -> list[Table]:
+    """For each coordinate, the error of every filter at the report times, with standard errors."""
+    times = list(times)
+    return [
+        Table(
+            f"{statistic}-{coordinate}",
+            _caption(statistic, coordinate, data),
+            ["filter", *(f"at {_at(time, data)}" for time in times)],
+            [[name(label), *_errors(data, label, coordinate, statistic, times)] for label in data.filters],
+        )
+        for coordinate in data.coordinates(statistic)
+    ]
+
+
+def _errors(data: Data, label: str, coordinate: str, statistic: str, times: list[float]) -> list[Cell]:
+    points = [data.at(label, coordinate, statistic, time) for time in times]
+    return [number(uncertain(value, stderr), value) for value, stderr in points]
+
+
+def best(found: list[Winner], data: Data) -> Table:
+    """The winners at all report times."""
+    statistic = WORDS[found[0].statistic] if found else "error"
+    rows = [
+        [
+            Cell(f"{winner.coordinate} at {_at(winner.time, data)}", winner.time),
+            name(winner.best),
+            prose(listed(winner.beaten) or "–"),
+            prose(listed(winner.level + tuple(f"{each} (failed)" for each in winner.failed)) or "–"),
+        ]
+        for winner in found
+    ]
+    heads = ["what", "smallest", "significantly larger", "not told apart"]
+    return Table("best", f"Smallest {statistic} at each report time, without the reference", heads, rows)
+
+
+def divergence(data: Data) -> Table:
+    """How many runs of each filter diverged, and how often its guard fired."""
+    rows = []
+    for row in data.divergence.to_dict("records"):
+        fraction = f"{percent(row['fraction'])}\u00a0% [{percent(row['low'])}, {percent(row['high'])}]"
+        guarded = f"{row['guarded']:,.0f}" if row["guarded"] else "–"
+        if row.get("guarded_fraction", 0) > 0:
+            guarded += f" ({percent(row['guarded_fraction'])}\u00a0%)"
+        kind = "bad" if row["diverged"] else ""
+        rows.append(
+            [
+                name(row["filter"]),
+                number(f"{row['diverged']:,.0f} of {row['n']:,.0f}", row["diverged"])._replace(
+                    kind=f"number {kind}"
+                ),
+                number(fraction, row["fraction"]),
+                number(plain(row["first_time_median"]), row["first_time_median"]),
+                number(guarded, row["guarded"]),
+            ]
+        )
+    heads = ["filter", "diverged runs", "fraction [95 % interval]", "median time", "guarded updates"]
+    return Table("divergence", "Diverged runs and guarded updates", heads, rows)
+
+
+def claims(table: pd.DataFrame) -> Table:
+    """The verdict on each claim."""
+    rows = []
+    for row in table.to_dict("records"):
+        interval = f"{plain(row['estimate'], 3)} [{plain(row['low'], 3)}, {plain(row['high'], 3)}]"
+        rows.append(
+            [
+                name(row["id"]),
+                Cell(
+                    VERDICTS.get(row["verdict"], row["verdict"]), row["verdict"], f"verdict {row['verdict']}"
+                ),
+                prose(row["says"]),
+                number(interval, row["estimate"]),
+                number(f"{row['n']:,.0f}", row["n"]),
+            ]
+        )
+    heads = ["claim", "verdict", "in words", "weakest difference [95 % interval]", "runs"]
+    return Table("claims", "Claims of the experiment file, tested on common random numbers", heads, rows)
+
+
+def cost(table: pd.DataFrame) -> Table:
+    """What each filter costs, in the columns that the run saved."""
+    columns = list(table.columns)
+    rows = [
+        [
+            name(row[column]) if isinstance(row[column], str) else number(plain(row[column], 3), row[column])
+            for column in columns
+        ]
+        for row in table.to_dict("records")
+    ]
+    return Table(
+        "cost",
+        "Cost of each filter on one core",
+        [COST.get(column, column.replace("_", " ")) for column in columns],
+        rows,
+    )
+
+
+def _caption(statistic: str, coordinate: str, data: Data) -> str:
+    unit = data.units.get(coordinate, "")
+    words = f"{WORDS[statistic]} of {coordinate}{unit and f' ({unit})'} ± standard error, {data.runs:,} runs"
+    return words[0].upper() + words[1:]
+
+
+def _at(time: float, data: Data) -> str:
+    return measured(plain(time), data.units["time"])
