@@ -1,4 +1,4 @@
-"""A system of the user's own, given to `nlbench.run` as a `System`; here it only has what its results must be told by."""
+"""A system of the user's own, given to `nlbench.run` as a `System`: here is only what its results record of it."""
 
 from __future__ import annotations
 

@@ -77,5 +77,5 @@ def test_process_noise_reaches_truth_and_filters(tmp_path):
 
 
 def test_named_own_without_a_system_says_how(tmp_path):
-    with pytest.raises(ConfigError, match="nlbench.System"):
+    with pytest.raises(ConfigError, match=r"nlbench\.System"):
         nb.run(config.from_dict({"experiment": "x", "system": "own", "filters": ["ekf"]}), tmp_path)

@@ -71,6 +71,7 @@ def test_a_checkpoint_of_other_software_is_refused(done, tmp_path):
     folder.save_checkpoint(arrays, **facts)
     with pytest.raises(EnvironmentFault, match=r"jaxlib: 0\.0\.1 then"):
         nb.run(experiment(monte_carlo={"runs": 2000, "seed": 11}), tmp_path)
+    assert folder.done_runs() == 1000  # what was finished stays so
 
 
 def test_a_folder_in_use_is_refused(done, tmp_path):

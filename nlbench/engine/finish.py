@@ -1,0 +1,52 @@
+"""The end of a run: tables, claims, costs and the manifest."""
+
+from __future__ import annotations
+
+import datetime
+from typing import TYPE_CHECKING
+
+from nlbench.engine.compiled import Compiled
+from nlbench.engine.cost import cost_table
+from nlbench.engine.resume import device, numerics
+from nlbench.results.folder import RunFolder
+from nlbench.results.manifest import commit, versions
+from nlbench.statistics.claims import evaluate
+from nlbench.statistics.summary import tables
+from nlbench.statistics.totals import Totals
+
+if TYPE_CHECKING:
+    from nlbench.config import Experiment
+
+
+def write(
+    folder: RunFolder,
+    experiment: Experiment,
+    compiled: Compiled,
+    totals: Totals,
+    seconds: float,
+    threads: int,
+) -> None:
+    """Write everything that a finished run leaves, the mark that it is done last."""
+    problem = compiled.problem
+    made = tables(totals)
+    if experiment.claims:
+        made["claims"] = evaluate(experiment.claims, made["statistics"], made["paired"])
+    made["cost"] = cost_table(problem, experiment.monte_carlo.seed)
+    folder.write_tables(made)
+    folder.finish(
+        totals.runs,
+        experiment=experiment.experiment,
+        hash=experiment.hash12(),
+        seed=experiment.monte_carlo.seed,
+        block=problem.block,
+        precision=experiment.engine.precision,
+        threads=threads,
+        units=problem.layout.magnitude_units,
+        versions=versions(),
+        commit=commit(),
+        device=device(),
+        fingerprint=numerics(compiled),
+        finished=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        seconds=round(seconds, 3),
+        compile_seconds=round(compiled.seconds, 3),
+    )
