@@ -113,7 +113,7 @@ def _system(raw: Mapping[str, Any], findings: list[Finding]) -> tuple[str | None
         findings.append(_nameless(given, ("system",), "system"))
         return None, None
     name = given.pop("name")
-    if name not in systems.available():
+    if name not in systems.MODULES:
         findings.append(
             Finding(("system", "name"), f"unknown system '{name}'{suggestion(name, systems.available())}")
         )

@@ -10,15 +10,16 @@ if TYPE_CHECKING:
 
     from nlbench.systems.system import System
 
+OWN = "own"  # stands in experiments for a System that was given in Python
 MODULES = {
     "culver-scalar": "nlbench.systems.culver_scalar",
-    "own": "nlbench.systems.own",
+    OWN: "nlbench.systems.own",
 }
 
 
 def available() -> tuple[str, ...]:
     """Names that `build` takes."""
-    return tuple(MODULES)
+    return tuple(name for name in MODULES if name != OWN)
 
 
 def parameters(name: str) -> type[BaseModel]:
