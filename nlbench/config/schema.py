@@ -26,6 +26,7 @@ Statistic = Literal[
     "nees",
     "coverage_95",
 ]
+Figure = Literal["rms", "rms_clipped", "mean_error", "variance", "third_moment", "divergence"]
 
 
 def _path_like(name: str) -> str:
@@ -63,7 +64,7 @@ class Head(Section):
         min_length=1,
         description="where claims, medians and kept runs are taken; default: the end",
     )
-    figures: list[str] | None = Field(
+    figures: list[Figure] | None = Field(
         default=None, description="kinds of figures to draw; default: all that apply"
     )
 
@@ -197,7 +198,7 @@ class Experiment(Section):
     claims: list[Claim] = Field(default_factory=list)
     engine: EngineSpec = EngineSpec()
     limits: Limits = Limits()
-    figures: list[str] | None = None
+    figures: list[Figure] | None = None
 
     @property
     def labels(self) -> tuple[str, ...]:

@@ -52,6 +52,7 @@ DASHES = (
 )
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
 MARKERS_PER_CURVE = 6
+GOLDEN = 0.381966  # of an interval between two markers: so far apart are those of two filters
 COLUMN = 16  # letters of a label that still leave room for three columns of them
 LINE = 54  # letters of a title
 POWERS = {1: "", 2: "²", 3: "³"}
@@ -95,7 +96,9 @@ def figure(height: float) -> Figure:
 def line(look: Look, index: int = 0, points: int = 1) -> dict[str, Any]:
     """Arguments of `plot` for a look. Markers of different curves sit at different times, so none hides another."""
     every = max(1, points // MARKERS_PER_CURVE)
-    return {**key(look), "markevery": (index % every, every)}
+    order = 1.9 if look == REFERENCE else 2.0  # the reference lies under the filters that reach it
+    first = int(every * (GOLDEN * index % 1.0))
+    return {**key(look), "markevery": (first, every), "zorder": order}
 
 
 def key(look: Look) -> dict[str, Any]:

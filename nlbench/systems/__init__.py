@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 OWN = "own"  # stands in experiments for a System that was given in Python
 MODULES = {
     "culver-scalar": "nlbench.systems.culver_scalar",
+    "oscillator": "nlbench.systems.oscillator",
     OWN: "nlbench.systems.own",
 }
 

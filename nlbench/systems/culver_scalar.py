@@ -25,14 +25,13 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from nlbench.moments.moments import Moments
+from nlbench.systems.ensembles import MATCHED_BOUND, MATCHED_DEVIATION, corrected, matched, normal_nodes
 from nlbench.systems.system import Coordinate, InitialGrid, Sets, System
 
 SUMMARY = "dx/dt = -2x + .7x^2 with noisy measurements of x (Culver 1969, chapter 7)"
 
 MEAN, VARIANCE = 2.0, 0.16
 ESCAPE = 20 / 7  # the unstable equilibrium of -2 x + .7 x^2
-MATCHED_BOUND = 0.84
-MATCHED_DEVIATION = 0.5003729518  # before truncation at the bound; the variance after it is VARIANCE
 GRID_POINTS = 320
 GRID_REACH = 6.0  # standard deviations of N(2, .16) that the grid covers
 
@@ -109,37 +108,26 @@ def _sampler(parameters: Parameters) -> Any:
         start = MEAN + parameters.initial_error.sigma * deviation
         return lambda key: jax.numpy.full(1, start)
     if parameters.ensemble == "thesis-sets":
-        return Sets(parameters.set_size, _corrected)
+        return Sets(parameters.set_size, lambda normals: MEAN + deviation * corrected(normals))
     if parameters.ensemble == "normal":
         return lambda key: MEAN + deviation * jax.random.normal(key, (1,))
     if parameters.ensemble == "conditioned":
         highest = (ESCAPE - MEAN) / deviation
         return lambda key: MEAN + deviation * jax.random.truncated_normal(key, -math.inf, highest, (1,))
-    bound = MATCHED_BOUND / MATCHED_DEVIATION
-    return lambda key: MEAN + MATCHED_DEVIATION * jax.random.truncated_normal(key, -bound, bound, (1,))
-
-
-def _corrected(normals: Any) -> Any:
-    """A set of initial states whose mean and mean square deviation are exactly those wanted: (size, 1)."""
-    centred = normals - normals.mean(0)
-    return MEAN + math.sqrt(VARIANCE) * centred / (centred**2).mean(0) ** 0.5
+    return lambda key: MEAN + matched(key, (1,))
 
 
 def _grid(parameters: Parameters) -> InitialGrid:
     """Initial conditions with their weights, at Gauss-Legendre nodes over the support of the ensemble."""
-    import numpy as np
-
     deviation = math.sqrt(VARIANCE)
     low, high, spread = MEAN - GRID_REACH * deviation, MEAN + GRID_REACH * deviation, deviation
     if parameters.ensemble == "matched":
         low, high, spread = MEAN - MATCHED_BOUND, MEAN + MATCHED_BOUND, MATCHED_DEVIATION
     elif parameters.ensemble == "conditioned":
         high = ESCAPE
-    nodes, lengths = np.polynomial.legendre.leggauss(GRID_POINTS)
-    points = (low + high) / 2 + (high - low) / 2 * nodes
-    weights = lengths * np.exp(-0.5 * ((points - MEAN) / spread) ** 2)
+    points, weights = normal_nodes(low, high, MEAN, spread, GRID_POINTS)
     flow = partial(_linear_flow, parameters.decay) if parameters.dynamics == "linear" else _flow
-    return InitialGrid(points, weights / weights.sum(), flow)
+    return InitialGrid(points, weights, flow)
 
 
 def _flow(t: Any, x0: Any) -> Any:

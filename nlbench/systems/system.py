@@ -37,6 +37,23 @@ class InitialGrid(NamedTuple):
     flow: Function
 
 
+class KalmanBank(NamedTuple):
+    """The exact posterior of a system whose last state is an unknown constant, and which is linear and Gaussian once
+    that constant is known: one Kalman filter for each of a grid of its values.
+
+    nodes: (p,) values of the last state. weights: (p,), prior probabilities.
+    mean: (k,), cov: (k, k): the other k = n - 1 states at the start, whatever the constant.
+    drift: (p, k, k), the matrix A of dx = A x dt + noise for each node. spectrum: (k, k), that of the noise, or None.
+    """
+
+    nodes: Any
+    weights: Any
+    mean: Any
+    cov: Any
+    drift: Any
+    spectrum: Any = None
+
+
 @dataclass(frozen=True)
 class System:
     """A continuous-time system dx = f dt + G dw, measured at discrete times or continuously.
@@ -83,7 +100,7 @@ class System:
     inputs: Function | None = None
     step: float | None = None
     interval: float | None = None
-    exact: InitialGrid | None = None
+    exact: InitialGrid | KalmanBank | None = None
     norms: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     @property

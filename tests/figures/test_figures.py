@@ -103,7 +103,7 @@ def test_the_settings_of_matplotlib_neither_matter_nor_change(tmp_path):
 
 
 def test_any_label_can_be_drawn(tmp_path):
-    labels = ["$\\frac{", "_hidden", "<script>&\"'", "a" * 60, "100 %"]
+    labels = ["$\\frac{$", "_hidden", "<script>&\"'", "a" * 60, "100 %"]
     run = synthetic_run.results(tmp_path, dict.fromkeys(labels, 1.2), diverged={labels[0]: 3})
     for path in figures.draw(run, ["rms", "variance", "divergence"]):
         if path.suffix == ".svg":
@@ -124,3 +124,11 @@ def test_a_filter_without_a_usable_number_does_not_hide_the_others(tmp_path):
 def test_one_filter_alone_is_compared_with_nothing(tmp_path):
     drawn = figures.draw(synthetic_run.results(tmp_path, {"second-order": 1.0}), ["rms"])
     assert "relative to" not in drawn[0].read_text()
+
+
+def test_experiment_files_may_name_every_kind_and_no_other():
+    from typing import get_args
+
+    from nlbench.config.schema import Figure
+
+    assert set(get_args(Figure)) == set(figures.FIGURES)
