@@ -33,12 +33,19 @@ def run(
     experiment: Experiment, own: System | None, out: str | Path, progress: Progress | None = None
 ) -> Results:
     """Compute what is missing of an experiment and write its results."""
+    with stop_requests() as stopped:
+        return _run(experiment, own, Path(out), progress or (lambda done, total: None), stopped)
+
+
+def _run(
+    experiment: Experiment, own: System | None, out: Path, progress: Progress, stopped: Callable[[], bool]
+) -> Results:
     problem = make(experiment, own)
     compiled = None
     if own is not None:  # what tells its results from those of another system is the program itself
         compiled = compile_chunks(problem, experiment.monte_carlo.seed)
         experiment = _identified(experiment, compiled.program)
-    folder = RunFolder(Path(out) / experiment.experiment / experiment.hash12())
+    folder = RunFolder(out / experiment.experiment / experiment.hash12())
     with folder.locked():
         done = finished_runs(folder)
         runs = max(experiment.monte_carlo.runs, done or 0)
@@ -52,7 +59,7 @@ def run(
         runs = max(runs, totals.runs)
         threads = experiment.engine.threads or runtime.threads()
         totals = _compute(
-            compiled, folder, totals, runs, threads, experiment.engine.chunk or CAPACITY, progress
+            compiled, folder, totals, runs, threads, experiment.engine.chunk or CAPACITY, progress, stopped
         )
         seconds = time.perf_counter() - begun
         write(folder, experiment, compiled, totals, seconds, threads)
@@ -71,31 +78,30 @@ def _compute(
     runs: int,
     threads: int,
     chunk: int,
-    progress: Progress | None,
+    progress: Progress,
+    stopped: Callable[[], bool],
 ) -> Totals:
     """Totals of all runs. The checkpoint holds whole blocks; a last, partial one is added to a copy."""
     block = compiled.problem.block
     whole, rest = divmod(runs, block)
-    report = progress or (lambda done, total: None)
     saved, saved_at = totals.blocks, time.monotonic()
-    report(totals.runs, runs)
-    with stop_requests() as stopped:
-        for first, sums in _in_order(compiled, totals.blocks, whole, runs, threads, chunk, stopped):
-            totals.add(first, sums)
-            report(totals.runs, runs)
-            if time.monotonic() - saved_at > SECONDS_BETWEEN_CHECKPOINTS:
-                checkpoint(folder, compiled, totals)
-                saved, saved_at = totals.blocks, time.monotonic()
-        if totals.blocks != saved:
+    progress(totals.runs, runs)
+    for first, sums in _in_order(compiled, totals.blocks, whole, runs, threads, chunk, stopped):
+        totals.add(first, sums)
+        progress(totals.runs, runs)
+        if time.monotonic() - saved_at > SECONDS_BETWEEN_CHECKPOINTS:
             checkpoint(folder, compiled, totals)
-        if stopped() and totals.blocks < whole:
-            raise Interrupted(
-                f"stopped after {totals.runs:,} of {runs:,} runs, which are saved; the same command goes on from there"
-            )
+            saved, saved_at = totals.blocks, time.monotonic()
+    if totals.blocks != saved:
+        checkpoint(folder, compiled, totals)
+    if stopped():
+        raise Interrupted(
+            f"stopped after {totals.runs:,} of {runs:,} runs, which are saved; the same command goes on from there"
+        )
     if rest:
         totals = totals.copy()
         totals.add(whole, compiled.sums(whole, 1, runs))
-        report(runs, runs)
+        progress(runs, runs)
     return totals
 
 

@@ -1,11 +1,17 @@
-"""Ctrl-C while blocks are computed: asked once, the run stops between chunks; asked twice, at once."""
+"""Ctrl-C during a run: asked once, it stops between chunks with everything saved; asked twice, at once.
+
+The signal is only noted, because an exception raised inside a callback of jax (while compiling, say) is lost.
+"""
 
 from __future__ import annotations
 
+import logging
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
+
+log = logging.getLogger("nlbench")
 
 
 @contextmanager
@@ -17,6 +23,7 @@ def stop_requests() -> Iterator[Callable[[], bool]]:
         if asked:
             raise KeyboardInterrupt
         asked.append(number)
+        log.warning("stopping once the blocks in flight are saved; Ctrl-C again stops at once")
 
     try:
         before = signal.signal(signal.SIGINT, note)

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
 class Integrator(BaseModel):
     """An integrator of the moment equations: a solver of diffrax by name, with tolerances (None: fixed steps)."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     solver: str = Field(default="rk4", description="rk4, or the name of a diffrax solver such as Tsit5")
     rtol: PositiveFloat | None = Field(default=None, description="relative tolerance of an adaptive solver")
@@ -20,7 +20,7 @@ class Integrator(BaseModel):
 class Options(BaseModel):
     """Options of a moment filter."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     equations: Literal["corrected", "printed"] = Field(
         default="corrected", description="the corrected equations, or those that the source printed"
@@ -48,7 +48,7 @@ class GuardedOptions(Options):
 class ExactOptions(BaseModel):
     """Options of the exact reference."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Row(NamedTuple):

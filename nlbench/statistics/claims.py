@@ -4,7 +4,7 @@
 report times), by the paired difference where there is one, otherwise as if independent (which is cautious,
 since the runs are shared). All comparisons of the experiment share Holm's (1979) correction at level 5 %. A
 claim is confirmed when all its comparisons are significant in the claimed direction, refuted when one is
-significant in the other, and undecided otherwise. The estimate shown is the difference of the comparison that
+significant in the other, and undecided otherwise; fewer than 30 runs decide nothing. The estimate shown is the difference of the comparison that
 supports the claim least, with its own 95 % interval.
 """
 
@@ -17,6 +17,7 @@ import pandas as pd
 from nlbench.statistics.uncertainty import NORMAL_975, p_value
 
 LEVEL = 0.05
+LEAST_RUNS = 30  # fewer do not make a mean normal enough for a verdict
 COLUMNS = ("id", "says", "verdict", "estimate", "low", "high", "n")
 
 
@@ -54,7 +55,7 @@ class Comparison(NamedTuple):
     def p(self) -> float:
         """1 where nothing can be said."""
         p = p_value(self.difference, self.stderr)
-        return 1.0 if math.isnan(p) else p
+        return 1.0 if math.isnan(p) or self.n < LEAST_RUNS else p
 
     @property
     def against(self) -> float:

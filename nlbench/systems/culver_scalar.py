@@ -39,7 +39,7 @@ GRID_REACH = 6.0  # standard deviations of N(2, .16) that the grid covers
 class InitialError(BaseModel):
     """A fixed initial error, truth minus estimate, in standard deviations."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     sigma: float = Field(ge=-2.0, le=2.0, description="initial error in standard deviations")
 
@@ -47,7 +47,7 @@ class InitialError(BaseModel):
 class Parameters(BaseModel):
     """Parameters of `culver-scalar`."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     ensemble: Literal["matched", "conditioned", "normal", "thesis-sets"] = "matched"
     set_size: int = Field(default=80, ge=2, le=1000, description="runs in a set, for thesis-sets")

@@ -13,7 +13,7 @@ SUMMARY = "a System of your own, given to nlbench.run from Python"
 class Parameters(BaseModel):
     """What an experiment with an own system records of it."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     interval: float | None = Field(default=None, gt=0.0, description="time between measurements")
     program: str | None = Field(default=None, description="what was compiled from it; filled in by the run")

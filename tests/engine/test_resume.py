@@ -43,6 +43,18 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(done, tmp_path):
     assert table_bytes(resumed.path) == table_bytes(done.path)
 
 
+def test_ctrl_c_while_compiling_stops_before_anything_is_computed(tmp_path, monkeypatch):
+    compile_chunks = driver.compile_chunks
+
+    def interrupted(*arguments):
+        signal.raise_signal(signal.SIGINT)
+        return compile_chunks(*arguments)
+
+    monkeypatch.setattr(driver, "compile_chunks", interrupted)
+    with pytest.raises(Interrupted, match="stopped after 0 of 1,000 runs"):
+        nb.run(experiment(), tmp_path)
+
+
 def test_a_finished_run_is_not_computed_again(done, tmp_path, monkeypatch):
     monkeypatch.setattr(driver, "compile_chunks", None)  # calling it would raise
     assert nb.run(experiment(), tmp_path).path == done.path

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nlbench.statistics.claims import evaluate, holm
+from nlbench.statistics.claims import Comparison, evaluate, holm
 from nlbench.statistics.uncertainty import p_value
 
 
@@ -110,3 +110,8 @@ def test_no_claims_give_no_rows_but_the_columns():
     table = evaluate([], *tables([]))
     assert list(table.columns) == ["id", "says", "verdict", "estimate", "low", "high", "n"]
     assert len(table) == 0
+
+
+def test_a_handful_of_runs_decides_nothing():
+    assert Comparison(difference=-1.0, stderr=1e-6, n=29).p == 1.0
+    assert Comparison(difference=-1.0, stderr=1e-6, n=30).p < 1e-6
