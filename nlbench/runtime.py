@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 from typing import Any
@@ -13,6 +14,7 @@ XLA_OPTIONS = (
     "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1000000000",
 )
 _chosen: dict[str, Any] = {}
+log = logging.getLogger("nlbench")
 
 
 def configure(precision: str = "float64", threads: int | None = None) -> None:
@@ -31,6 +33,11 @@ def configure(precision: str = "float64", threads: int | None = None) -> None:
         )
     if not backend_started():
         _set_options()
+    elif _missing_options() and not _chosen:
+        log.warning(
+            "jax has started without XLA's options for nlbench, and its filters will run about 3 times slower: "
+            "call nlbench.configure() before the first computation"
+        )
     import jax
 
     jax.config.update("jax_enable_x64", precision == "float64")
@@ -61,8 +68,12 @@ def backend_started() -> bool:
     return xla_bridge.backends_are_initialized()
 
 
-def _set_options() -> None:
+def _missing_options() -> list[str]:
+    """Options that the environment does not set; what the user has set stays."""
     present = os.environ.get("XLA_FLAGS", "")
-    missing = [option for option in XLA_OPTIONS if option.split("=")[0] not in present]
-    if missing:
-        os.environ["XLA_FLAGS"] = " ".join([present, *missing]).strip()
+    return [option for option in XLA_OPTIONS if option.split("=")[0] not in present]
+
+
+def _set_options() -> None:
+    flags = [os.environ.get("XLA_FLAGS", ""), *_missing_options()]
+    os.environ["XLA_FLAGS"] = " ".join(flags).strip()

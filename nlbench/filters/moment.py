@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import jax.numpy as jnp
 
 from nlbench.algebra import Tensor, einsum, log_determinant, zeros
+from nlbench.errors import ConfigError
 from nlbench.filters.filter import Filter, UpdateInfo
 from nlbench.moments import integrate as integration
 from nlbench.moments.equations import fourth_moment_rate, rates
@@ -40,7 +41,9 @@ UPDATES: dict[str, Callable] = {
 
 
 def build(name: str, row: Row, system: System, options: Options) -> Filter:
-    """The filter of a catalogue row, bound to a system."""
+    """The filter of a catalogue row, bound to a system. Raises `ConfigError` if its measurements are continuous."""
+    if system.measurement == "continuous":
+        raise ConfigError(f"{name}: takes measurements at discrete times, and the system's are continuous")
     integrator = integration.build(**options.integrator.model_dump())
 
     def integrate(state: Components, t: Any, h: Any, count: Any) -> Components:

@@ -4,8 +4,8 @@
 report times), by the paired difference where there is one, otherwise as if independent (which is cautious,
 since the runs are shared). All comparisons of the experiment share Holm's (1979) correction at level 5 %. A
 claim is confirmed when all its comparisons are significant in the claimed direction, refuted when one is
-significant in the other, and undecided otherwise; fewer than 30 runs decide nothing. The estimate shown is the difference of the comparison that
-supports the claim least, with its own 95 % interval.
+significant in the other, and undecided otherwise; fewer than 30 runs decide nothing. The estimate shown is the
+difference of the comparison that supports the claim least, with its own 95 % interval.
 """
 
 import math

@@ -1,0 +1,67 @@
+"""Claims: importing nlbench changes nothing; settings are made once, before jax starts; too late is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import nlbench as nb
+from nlbench.errors import ConfigError
+from tests.small_runs import python
+
+
+def output(program, **options):
+    done = python(program, **options)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def test_import_loads_neither_jax_nor_pandas_and_sets_nothing():
+    program = "import os, sys, nlbench; print('jax' in sys.modules, 'pandas' in sys.modules, os.environ['XLA_FLAGS'])"
+    assert output(program).stdout.split() == ["False", "False"]
+
+
+def test_configure_sets_double_precision_and_the_options_and_keeps_the_users_own():
+    program = (
+        "import os, nlbench; nlbench.configure(); nlbench.configure(); import jax\n"
+        "print(jax.numpy.zeros(1).dtype, os.environ['XLA_FLAGS'])"
+    )
+    dtype, *flags = output(program, xla_flags="--xla_cpu_prefer_vector_width=256").stdout.split()
+    assert dtype == "float64"
+    assert flags[0] == "--xla_cpu_prefer_vector_width=256"
+    assert len(flags) == 2
+    assert flags[1].startswith("--xla_backend_extra_options=")
+
+
+def test_too_late_is_said_once():
+    program = "import jax; jax.numpy.zeros(1).block_until_ready(); import nlbench" + 2 * "; nlbench.configure()"
+    assert output(program).stderr.count("call nlbench.configure() before") == 1
+
+
+def test_single_precision_when_asked_and_no_other_afterwards():
+    program = (
+        "import nlbench; nlbench.configure(precision='float32'); import jax; print(jax.numpy.zeros(1).dtype)\n"
+        "try: nlbench.configure()\nexcept nlbench.errors.ConfigError as error: print(error)"
+    )
+    lines = output(
+        program.replace("import nlbench;", "import nlbench, nlbench.errors;", 1)
+    ).stdout.splitlines()
+    assert lines[0] == "float32"
+    assert "float32 in this process" in lines[1]
+
+
+def test_an_unknown_precision_is_refused():
+    with pytest.raises(ConfigError, match="float16"):
+        nb.configure(precision="float16")
+
+
+def test_a_moment_filter_refuses_continuous_measurements():
+    system = nb.System(
+        drift=lambda t, x: x,
+        observe=lambda t, x: x,
+        measurement_cov=np.eye(1),
+        initial=nb.Moments(np.zeros(1), np.eye(1)),
+        measurement="continuous",
+    )
+    with pytest.raises(ConfigError, match="discrete times"):
+        nb.filters.build("third-order", system)
