@@ -1,5 +1,16 @@
 """The command line: each command parses, calls one function of the package and prints."""
 
-from nlbench.cli.app import main
+import sys
 
 __all__ = ["main"]
+
+
+def main() -> None:
+    """The command `nlbench`; Ctrl-C at any moment ends it with exit code 130."""
+    try:
+        from nlbench.cli.app import app
+
+        app(prog_name="nlbench")
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        sys.exit(130)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from typing import Annotated, Any
 
 import typer
@@ -85,9 +84,12 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
+        from importlib.metadata import PackageNotFoundError, version
 
-        print(f"nlbench {version('nlbench')}")
+        try:
+            print(f"nlbench {version('nlbench')}")
+        except PackageNotFoundError:
+            print("nlbench, not installed: run from its source")
         raise typer.Exit
 
 
@@ -109,11 +111,3 @@ app.command("list")(listing.show)
 app.command("report")(saved.report)
 app.command("replay")(saved.replay)
 app.command("doctor")(preview.doctor)
-
-
-def main() -> None:
-    """Run the command line of this process."""
-    try:
-        app(prog_name="nlbench")
-    except KeyboardInterrupt:
-        sys.exit(Interrupted.exit_code)

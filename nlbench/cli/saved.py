@@ -29,8 +29,16 @@ def report(
             first = options.command("run", where, settings)
             raise ConfigError(f"{where}: no results in {folder}; make them with: {first}")
     from nlbench import report as reports
+    from nlbench.errors import DamagedResults, EnvironmentFault
+    from nlbench.results.folder import RunFolder
     from nlbench.results.results import Results
 
+    if RunFolder(folder).done_runs() is None and (folder / "batches").is_dir():
+        raise EnvironmentFault(
+            f"{folder}: the run is not finished; the command that began it goes on with it"
+        )
+    if faults := Results(folder).damaged():
+        raise DamagedResults("\n".join(faults))
     page = reports.write(Results(folder))
     print(f"report  {page}")
     output.next_step(f"open {page}", "all figures and tables on one page; it needs no network")

@@ -129,7 +129,9 @@ def _entry(given: Any) -> Any:
 
 def _nameless(given: Any, path: Path, what: str) -> Finding:
     if isinstance(given, dict) and "name" not in given:
-        return Finding((*path, "name"), f"missing; expected the {what}'s name", at_key=True)
+        misspelt = next((key for key in given if closest(str(key), ["name"])), None)
+        hint = f"; did you mean 'name' instead of '{misspelt}'?" if misspelt else ""
+        return Finding((*path, "name"), f"missing; expected the {what}'s name{hint}", at_key=True)
     if isinstance(given, dict):
         return Finding((*path, "name"), f"expected the {what}'s name, found {found(given['name'])}")
     return Finding(path, f"expected a {what}'s name or a mapping with one, found {found(given)}")
@@ -168,8 +170,7 @@ def _label(entry: Any) -> str | None:
     """The label of an entry, as far as it can be told when other things about the entry are wrong."""
     if not isinstance(entry, dict):
         return None
-    name = entry.get("name")
-    label = entry.get("label", name if name in catalogue.available() else None)
+    label = entry.get("label", entry.get("name"))
     return label if isinstance(label, str) else None
 
 

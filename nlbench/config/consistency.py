@@ -62,6 +62,9 @@ def times(
         interval = holder.get("interval")
         if isinstance(interval, (int, float)):
             findings += _multiple((*path, "interval"), interval, "time.step", time.step)
+            if holder.get("measurement") != "none" and interval > time.end * (1 + 1e-9):
+                message = f"{interval:g} is longer than time.end = {time.end:g}, so nothing would be measured"
+                findings.append(Finding((*path, "interval"), f"{message}; measurement: none says so"))
     for index, spec in enumerate(filters):
         step = spec.options.get("step") if spec else None
         if step is not None:

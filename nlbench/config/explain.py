@@ -76,10 +76,11 @@ def found(value: Any) -> str:
 def expected(annotation: Any, metadata: tuple[Any, ...] = ()) -> str:
     """What values a field takes, with their range: `a whole number of at least 1`."""
     origin, members = get_origin(annotation), get_args(annotation)
+    metadata = tuple(bound for each in metadata for bound in getattr(each, "metadata", (each,)))
     if origin is Annotated:
         return expected(members[0], (*members[1:], *metadata))
     if origin in (Union, types.UnionType):
-        return " or ".join(expected(member, metadata) for member in members)
+        return " or ".join(expected(member, () if member is type(None) else metadata) for member in members)
     if origin is Literal:
         *others, last = [repr(member) for member in members]
         return f"{', '.join(others)} or {last}" if others else last

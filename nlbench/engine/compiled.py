@@ -43,11 +43,6 @@ class Compiled(NamedTuple):
         chunk = make_chunk(self.problem, block, 1, CAPACITY, trajectory + 1, (0, lane))
         return jax.tree.map(np.asarray, self.executable(self.seed, chunk)[1])
 
-    def memory(self) -> int:
-        """Bytes that a call takes for its inputs, outputs and temporaries."""
-        needs = self.executable.memory_analysis()
-        return needs.argument_size_in_bytes + needs.output_size_in_bytes + needs.temp_size_in_bytes
-
 
 def compile_chunks(problem: Problem, seed: int) -> Compiled:
     """Compile the block computation; the persistent cache keeps the result for the next process."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,10 @@ CALIBRATION_BLOCKS = 16
 
 
 def plan(experiment: Experiment, own: System | None = None) -> dict[str, Any]:
-    """Runs, blocks, steps, filters; seconds to compile and to run; bytes of memory and disk."""
+    """Runs, blocks, steps, filters; seconds to compile and to run; bytes of memory and disk.
+
+    Memory is the peak of this process, which has just done the same; it does not grow with the number of runs.
+    """
     problem = make(experiment, own)
     compiled = compile_chunks(problem, experiment.monte_carlo.seed)
     runs, threads = experiment.monte_carlo.runs, experiment.engine.threads or runtime.threads()
@@ -40,6 +44,6 @@ def plan(experiment: Experiment, own: System | None = None) -> dict[str, Any]:
         "threads": threads,
         "compile_seconds": compiled.seconds,
         "run_seconds": min(times) / count * blocks / threads,
-        "memory_bytes": compiled.memory() * threads + state,
+        "memory_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
         "disk_bytes": 2 * state,
     }

@@ -17,7 +17,8 @@ def build(name: str, system: System, **options: Any) -> Filter:
     """The filter of that name for a system.
 
     options: those of `nlbench.filters.options(name)`.
-    Raises `ConfigError` for an unknown name or option, and where the filter does not apply to the system.
+    Raises `ConfigError` for an unknown name or option, where the filter does not apply to the system,
+    and where what the system's functions return has the wrong shape.
     """
     from nlbench.checks import checked, known
     from nlbench.runtime import ensure_precision
@@ -25,6 +26,9 @@ def build(name: str, system: System, **options: Any) -> Filter:
     row = FILTERS[known(name, FILTERS, what="filter")]
     chosen = checked(row.options, options, where=name)
     ensure_precision()
+    from nlbench.filters.shapes import check_shapes
+
+    check_shapes(system)
     if name == "exact":
         from nlbench.references import build as build_reference
 

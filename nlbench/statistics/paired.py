@@ -96,6 +96,8 @@ def _influences(totals: Totals) -> Iterator[tuple[int, int, str, np.ndarray]]:
 
 
 def _rms_influence(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    if a.shape[-1] == 0:
+        return np.zeros_like(a)
     with np.errstate(invalid="ignore", divide="ignore"):
         halves = [square / (2 * np.sqrt(square.mean(-1, keepdims=True))) for square in (a, b)]
     return halves[0] - halves[1]

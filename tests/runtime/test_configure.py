@@ -34,7 +34,9 @@ def test_configure_sets_double_precision_and_the_options_and_keeps_the_users_own
 
 
 def test_too_late_is_said_once():
-    program = "import jax; jax.numpy.zeros(1).block_until_ready(); import nlbench" + 2 * "; nlbench.configure()"
+    program = (
+        "import jax; jax.numpy.zeros(1).block_until_ready(); import nlbench" + 2 * "; nlbench.configure()"
+    )
     assert output(program).stderr.count("call nlbench.configure() before") == 1
 
 
@@ -65,3 +67,21 @@ def test_a_moment_filter_refuses_continuous_measurements():
     )
     with pytest.raises(ConfigError, match="discrete times"):
         nb.filters.build("third-order", system)
+
+
+def test_every_wrong_shape_is_named_with_what_was_expected():
+    system = nb.System(
+        drift=lambda t, x: x[:1],
+        observe=lambda t, x: x,
+        measurement_cov=np.eye(1),
+        initial=nb.Moments(np.zeros(2), np.eye(3)),
+        diffusion=lambda t, x: np.ones(2),
+    )
+    with pytest.raises(ConfigError) as caught:
+        nb.filters.build("ekf", system)
+    assert str(caught.value).splitlines() == [
+        "initial.cov: got shape (3, 3), expected (2, 2)",
+        "drift(t, x): got shape (1,), expected (2,)",
+        "observe(t, x): got shape (2,), expected (1,)",
+        "diffusion(t, x): got shape (2,), expected (2, any)",
+    ]
