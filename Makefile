@@ -7,7 +7,7 @@ INSTALL := $(PIP) install --require-hashes --only-binary :all: -r
 LOCK := uv pip compile --quiet --universal --generate-hashes --no-annotate --no-header --python-version 3.11
 EXPERIMENT ?= configs/quickstart.yaml
 OPTIONS ?=
-PYTEST_OPTIONS ?=
+PYTEST_OPTIONS ?= -m "not long"
 
 .DEFAULT_GOAL := help
 .PHONY: help run test check format lint types bench lock clean

@@ -10,9 +10,10 @@ Mean (10, 0, .5) and covariance diag(9, 9, P33) at the start are printed, with P
 8.10-8.12 and .09 in 8.7-8.9; so are R = 50 every .2 s (8.4-8.9) and R = 10 every 1 s (8.10-8.12), and the Runge-Kutta
 step of .05 s. Process noise is in (8.5) but in no printed simulation: G = 0 (chosen).
 
-The printed damping ratio is normal, and 11 % of its draws are negative: unstable, with amplitudes up to e^10 and more
-at 10 s. Ensembles differ in how it is drawn; position and velocity are always normal:
-  matched      .5 + sqrt(P33/.16) d, with the bounded d of `ensembles` (default; chosen): variance P33, |d| <= .84
+The printed damping ratio is normal, and 11 % of its draws (for P33 = .16) are negative: unstable. Ensembles differ in
+how it is drawn; position and velocity are always normal:
+  matched      .5 + sqrt(P33/.16) d, with the bounded d of `ensembles` (default; chosen): variance P33,
+               between -.34 and 1.34 for P33 = .16
   normal       N(.5, P33), as printed
   thesis-sets  sets of 20 or 10, sample means and variances corrected (printed, section 8.2)
 Diverged (chosen): an error above 3 in damping or 100 in position, from the first such report time on.

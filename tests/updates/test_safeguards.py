@@ -244,3 +244,12 @@ def test_a_guarded_update_reports_a_finite_likelihood(name):
     assert float(info.nu) < -1
     gaussian = -0.5 * (y[0] ** 2 / 1.5 + np.log(2 * np.pi * 1.5))
     np.testing.assert_allclose(info.log_likelihood, gaussian, rtol=1e-12)
+
+
+def test_a_negative_predicted_variance_leaves_nothing_of_the_residual():
+    from nlbench.algebra import Tensor
+    from nlbench.updates.limiter import limited
+
+    S_z = Tensor.from_array(np.array([[-1.0, 0.0], [0.0, 4.0]]), ((0, 1),))
+    clipped = limited(Tensor.from_array(np.array([3.0, 9.0])), S_z, 2.0)
+    np.testing.assert_array_equal(np.asarray(clipped.to_array()), [0.0, 4.0])
