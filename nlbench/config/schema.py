@@ -169,7 +169,9 @@ class Claim(Section):
 class EngineSpec(Section):
     """How the runs are computed. Only block and precision can change a digit of the results."""
 
-    chunk: int | None = Field(default=None, ge=1, le=1_000_000, description="blocks in each call")
+    chunk: int | None = Field(
+        default=None, ge=1, le=1_000_000, description="blocks in each call; 64 at most are"
+    )
     threads: int | None = Field(default=None, ge=1, le=4096, description="default: one for each core")
     block: int = Field(default=64, ge=1, le=65536, description="trajectories in a block")
     precision: Literal["float64", "float32"] = "float64"

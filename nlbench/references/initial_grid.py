@@ -17,11 +17,10 @@ import jax.numpy as jnp
 from nlbench.algebra import Tensor
 from nlbench.filters.filter import Filter, UpdateInfo
 from nlbench.moments.moments import Components, Moments, dense, to_full
+from nlbench.references.sums import total as sum_over_nodes
 
 if TYPE_CHECKING:
     from nlbench.systems.system import InitialGrid, System
-
-ROWS = 16  # partial sums, so that they vectorise
 
 
 class State(NamedTuple):
@@ -71,18 +70,14 @@ def _weighed(state: State, points: Any) -> tuple[Any, Any, Any]:
     there = jnp.isfinite(points)
     level = jnp.where(there, state.log_weights, -jnp.inf)
     weights = jnp.exp(level - jnp.max(level))
-    return weights, _sum(weights), jnp.where(there, points, 0.0)
-
-
-def _sum(values: Any) -> Any:
-    return jnp.sum(jnp.sum(values.reshape(-1, ROWS), axis=0)) if values.size % ROWS == 0 else jnp.sum(values)
+    return weights, sum_over_nodes(weights), jnp.where(there, points, 0.0)
 
 
 def _moments(grid: InitialGrid, starts: Any, state: State) -> Components:
     weights, total, x = _weighed(state, grid.flow(state.t, starts))
-    mean = _sum(weights * x) / total  # (2)
+    mean = sum_over_nodes(weights * x) / total  # (2)
     e = x - mean
-    variance, third, fourth = (_sum(weights * e**k) / total for k in (2, 3, 4))
+    variance, third, fourth = (sum_over_nodes(weights * e**k) / total for k in (2, 3, 4))
     central = [variance, third, fourth - 3 * variance**2]
     return dense(
         Components(*(Tensor.symmetric(1, k + 1, lambda _, v=v: v) for k, v in enumerate([mean, *central])))
@@ -97,8 +92,8 @@ def _rates(grid: InitialGrid, starts: Any, state: State) -> Moments:
 
 def _info(prior: State, posterior: State, h: Any, y: Any, R: Any) -> UpdateInfo:
     weights, total, predicted = _weighed(State(prior.t, prior.log_weights), h)
-    mean = _sum(weights * predicted) / total
-    variance = _sum(weights * jnp.square(predicted - mean)) / total + R
+    mean = sum_over_nodes(weights * predicted) / total
+    variance = sum_over_nodes(weights * jnp.square(predicted - mean)) / total + R
     missing = jnp.isnan(jnp.asarray(y).reshape(()))
     gained = jax.nn.logsumexp(posterior.log_weights) - jax.nn.logsumexp(prior.log_weights)
     evidence = gained - 0.5 * jnp.log(2 * math.pi * R)

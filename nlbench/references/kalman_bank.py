@@ -26,14 +26,13 @@ from nlbench.algebra import Tensor, einsum, log_determinant
 from nlbench.filters.filter import Filter, UpdateInfo
 from nlbench.moments.closures import fourth_coefficient
 from nlbench.moments.moments import Components, Moments, dense, to_full
+from nlbench.references.sums import total as sum_over_nodes
 from nlbench.updates.kalman import kalman
 from nlbench.updates.measurement import gain, linearise
 from nlbench.updates.posterior import through_gain
 
 if TYPE_CHECKING:
     from nlbench.systems.system import KalmanBank, System
-
-ROWS = 16  # partial sums, so that they vectorise
 
 
 class State(NamedTuple):
@@ -131,13 +130,9 @@ def _updated(system: System, t: Any, node: Any, prior: Components, y: Any) -> Up
     return Updated(dense(kalman(prior, gained, z, z).moments), -0.5 * level, z.dense(), gained.S_z.dense())
 
 
-def _sum(values: Any) -> Any:
-    return jnp.sum(jnp.sum(values.reshape(-1, ROWS), axis=0)) if values.size % ROWS == 0 else jnp.sum(values)
-
-
 def _normalised(log_weights: Any) -> Any:
     weights = jnp.exp(log_weights - jnp.max(log_weights))
-    return weights / _sum(weights)
+    return weights / sum_over_nodes(weights)
 
 
 def _moments(nodes: Any, state: State) -> Components:
@@ -145,11 +140,11 @@ def _moments(nodes: Any, state: State) -> Components:
     w, each = _normalised(state.log_weights), state.each
     n = each.mean.shape[0] + 1
     points = [*each.mean, nodes]
-    mean = [_sum(w * x) for x in points]
+    mean = [sum_over_nodes(w * x) for x in points]
     d = [x - m for x, m in zip(points, mean, strict=True)]
 
     def central(order: int) -> Tensor:
-        return Tensor.symmetric(n, order, lambda index: _sum(w * _expected(index, d, each.cov)))
+        return Tensor.symmetric(n, order, lambda index: sum_over_nodes(w * _expected(index, d, each.cov)))
 
     cov = central(2)
     return dense(
@@ -196,11 +191,13 @@ def _info(prior: State, posterior: State, each: Updated) -> UpdateInfo:
     """Mean and covariance of the mixture of the nodes' residuals, and what the data said."""
     w = _normalised(prior.log_weights)
     m = each.z.shape[0]
-    mean = [_sum(w * z) for z in each.z]
+    mean = [sum_over_nodes(w * z) for z in each.z]
     cov = Tensor.symmetric(
         m,
         2,
-        lambda rs: _sum(w * (each.S_z[rs] + (each.z[rs[0]] - mean[rs[0]]) * (each.z[rs[1]] - mean[rs[1]]))),
+        lambda rs: sum_over_nodes(
+            w * (each.S_z[rs] + (each.z[rs[0]] - mean[rs[0]]) * (each.z[rs[1]] - mean[rs[1]]))
+        ),
     )
     gained = jax.nn.logsumexp(posterior.log_weights) - jax.nn.logsumexp(prior.log_weights)
     return UpdateInfo(
