@@ -13,6 +13,7 @@ _HOMES = {
     "load": "nlbench.config",
     "run": "nlbench.engine",
     "algebra": None,
+    "orbit": None,
     "filters": None,
     "systems": None,
     "updates": None,

@@ -11,6 +11,7 @@ class Schedule(NamedTuple):
 
     step: integration step. segment_steps: steps in a segment. segments: number of segments.
     measured_every: segments between measurements (0: none). output_every: segments between outputs.
+    sightings: how many measurements can be made that wait for an angle, at the end of any segment (0: none).
     """
 
     step: float
@@ -18,10 +19,11 @@ class Schedule(NamedTuple):
     segments: int
     measured_every: int
     output_every: int
+    sightings: int = 0
 
     @property
     def measurements(self) -> int:
-        """Number of measurements; the first comes one interval after the start."""
+        """Number of measurements at fixed times; the first comes one interval after the start."""
         return self.segments // self.measured_every if self.measured_every else 0
 
     @property
@@ -40,16 +42,20 @@ class Schedule(NamedTuple):
         return self.segment_times[self.measured_every :: self.measured_every] if self.measured_every else ()
 
 
-def make(end: float, step: float, output: float, interval: float | None) -> Schedule:
-    """The schedule of a run; `interval` None means no measurements.
+def make(end: float, step: float, output: float, interval: float | None, sightings: int = 0) -> Schedule:
+    """The schedule of a run; `interval` None means no measurements at fixed times.
+
+    With sightings every step is a segment, so that one can be made after each.
 
     end and output are multiples of step and end one of output, as validated experiments are; an interval longer than
     the run means that none is taken.
     """
     output_steps = round(output / step)
     interval_steps = round(interval / step) if interval is not None else 0
-    segment = math.gcd(output_steps, interval_steps)
+    segment = 1 if sightings else math.gcd(output_steps, interval_steps)
     total = round(end / output) * output_steps
     if interval_steps > total:
         interval_steps, segment = 0, output_steps
-    return Schedule(step, segment, total // segment, interval_steps // segment, output_steps // segment)
+    return Schedule(
+        step, segment, total // segment, interval_steps // segment, output_steps // segment, sightings
+    )

@@ -54,7 +54,7 @@ def initial_state(system: System, key: Any, trajectory: Trajectory) -> Any:
         highs = trajectory.first_high + (lows < trajectory.first_low).astype(jnp.uint32)
         keys = jax.vmap(lambda high, low: trajectory_key(key, high, low, INITIAL))(highs, lows)
         normals = jax.vmap(lambda each: jax.random.normal(each, (system.states,)))(keys)
-        return system.sample.transform(normals)[trajectory.member]
+        return jnp.asarray(system.sample.transform(normals))[trajectory.member]
     own = trajectory_key(key, trajectory.high, trajectory.low, INITIAL)
     if system.sample is not None:
         return system.sample(own)
@@ -63,23 +63,33 @@ def initial_state(system: System, key: Any, trajectory: Trajectory) -> Any:
     )
 
 
-def simulate(system: System, schedule: Schedule, key: Any, trajectory: Trajectory) -> tuple[Any, Any]:
-    """States at the ends of the schedule's segments, the start first, (segments + 1, n), and measurements, (M, m)."""
+class Simulated(NamedTuple):
+    """Of one trajectory: states at the ends of the schedule's segments, the start first, (segments + 1, n);
+    measurements at fixed times (M, m); noise of the sightings (K, m)."""
+
+    states: Any
+    measurements: Any
+    noise: Any
+
+
+def simulate(system: System, schedule: Schedule, key: Any, trajectory: Trajectory) -> Simulated:
+    """The truth, and what is measured of it or will be."""
     start = initial_state(system, key, trajectory)
     own = trajectory_key(key, trajectory.high, trajectory.low, PROCESS)
-    states = jnp.concatenate([start[None], _path(system, schedule, own, start)])
-    if not schedule.measurements:
-        return states, jnp.zeros((0, system.measurements))
+    states = jnp.concatenate([start[None], path(system, schedule, own, start)])
     own = trajectory_key(key, trajectory.high, trajectory.low, MEASUREMENT)
-    noise = jax.random.normal(own, (schedule.measurements, system.measurements))
+    count = schedule.sightings or schedule.measurements
+    noise = jax.random.normal(own, (count, system.measurements)) @ root(system.measurement_cov)
+    if not schedule.measurements:
+        return Simulated(states, noise[:0], noise)
     times = jnp.asarray(schedule.measurement_times)
     measured = states[schedule.measured_every :: schedule.measured_every]
     h = jax.vmap(lambda t, x: _stacked(system.observe(t, x)))(times, measured)
-    return states, h + noise @ root(system.measurement_cov)
+    return Simulated(states, h + noise, noise[:0])
 
 
-def _path(system: System, schedule: Schedule, key: Any, start: Any) -> Any:
-    """States at the ends of the segments, (segments, n)."""
+def path(system: System, schedule: Schedule, key: Any, start: Any) -> Any:
+    """States at the ends of the segments, (segments, n), from `start`."""
     advance = _deterministic if system.diffusion is None else _stochastic
     return advance(system, schedule, key, start)
 

@@ -9,14 +9,15 @@ import jax.numpy as jnp
 import numpy as np
 from jax.extend.core import jaxpr_as_fun
 
-from nlbench.engine.follow import follow, over_lanes
+from nlbench.engine.follow import Followed, follow, over_lanes
 from nlbench.engine.judge import judge
-from nlbench.simulate import Trajectory, seed_key, simulate
+from nlbench.engine.sighting import follow_sightings
+from nlbench.simulate import Simulated, Trajectory, seed_key, simulate
 from nlbench.statistics.accumulate import block_sums
 from nlbench.statistics.tracks import Tracks
 
 if TYPE_CHECKING:
-    from nlbench.engine.problem import Problem
+    from nlbench.engine.problem import Problem, Runner
 
 WORD = 1 << 32
 
@@ -34,11 +35,14 @@ class Chunk(NamedTuple):
 
 class View(NamedTuple):
     """One trajectory in full: true states (T, n), measurements (M, m), and of each filter the unique components of
-    mean, covariance and third moment (T, k), whether diverged (T,), and how many updates the guard replaced."""
+    mean, covariance and third moment (T, k), the errors and their estimated variances (T, C), whether diverged (T,),
+    and how many updates the guard replaced."""
 
     truth: Any
     measurements: Any
     components: tuple[Any, ...]
+    error: tuple[Any, ...]
+    variance: tuple[Any, ...]
     diverged: tuple[Any, ...]
     guarded: tuple[Any, ...]
 
@@ -102,10 +106,13 @@ def block_tracks(
     problem: Problem, seed: tuple[Any, Any], lanes: Trajectory, lane: Any
 ) -> tuple[Tracks, View]:
     """What the filters did on one block, and one lane of it."""
-    states, measurements = trajectories(problem, seed, lanes)
-    layout = problem.layout
-    followed = [follow(r, problem.schedule, measurements, problem.block) for r in problem.runners]
-    judged = [judge(problem.truth, layout, states, each.components) for each in followed]
+    data = trajectories(problem, seed, lanes)
+    states, layout = data.states[:: problem.schedule.output_every], problem.layout
+    moments = [followed(problem, runner, data) for runner in problem.runners]
+    judged = [
+        judge(problem.judged_by, runner.filter.system, layout, states, each.components)
+        for runner, each in zip(problem.runners, moments, strict=True)
+    ]
     reports = np.asarray(layout.reports)
     coordinates = range(len(layout.coordinates))
     squares = np.array([layout.components(2).index((i, i)) for i in coordinates])
@@ -118,22 +125,29 @@ def block_tracks(
         cov=jnp.stack([each.cov[reports] for each in judged]),
         cross_third=jnp.stack([each.third[reports] for each in judged]),
         diverged=jnp.stack([each.diverged for each in judged]),
-        guarded=jnp.stack([each.guarded for each in followed]),
-        updates=problem.schedule.measurements,
+        guarded=jnp.stack([each.guarded for each in moments]),
+        updates=jnp.stack([each.updates for each in moments]),
     )
     view = View(
         states,
-        measurements,
-        tuple(each.components for each in followed),
+        data.measurements,
+        tuple(each.components for each in moments),
+        tuple(each.error for each in judged),
+        tuple(each.cov[:, squares] for each in judged),
         tuple(each.diverged for each in judged),
-        tuple(each.guarded for each in followed),
+        tuple(each.guarded for each in moments),
     )
     return tracks, jax.tree.map(lambda leaf: leaf[..., lane], view)
 
 
-def trajectories(problem: Problem, seed: tuple[Any, Any], lanes: Trajectory) -> tuple[Any, Any]:
-    """True states at the output times (T, n, L) and measurements (M, m, L) of a block."""
+def trajectories(problem: Problem, seed: tuple[Any, Any], lanes: Trajectory) -> Simulated:
+    """Truth and measurements of a block, the lanes last."""
     key = seed_key(*seed)
-    each = over_lanes(lambda trajectory: simulate(problem.truth, problem.schedule, key, trajectory))
-    states, measurements = each(lanes)
-    return states[:: problem.schedule.output_every], measurements
+    return over_lanes(lambda trajectory: simulate(problem.truth, problem.schedule, key, trajectory))(lanes)
+
+
+def followed(problem: Problem, runner: Runner, data: Simulated) -> Followed:
+    """One filter along the data of a block."""
+    if problem.schedule.sightings:
+        return follow_sightings(problem, runner, data)
+    return follow(runner, problem.schedule, data.measurements, problem.block)

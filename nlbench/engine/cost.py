@@ -11,15 +11,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from nlbench.engine.block import make_chunk, trajectories, words
-from nlbench.engine.follow import follow
+from nlbench.engine.block import followed, make_chunk, trajectories, words
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from nlbench.engine.problem import Problem, Runner
+    from nlbench.simulate import Simulated
 
-BLOCKS = 16
+MOST_BLOCKS = 16
+MOST_STEPS = 500_000  # of all trajectories timed together
 ROUNDS = 7
 ARITHMETIC = frozenset(
     "abs add atan2 cos div exp expm1 integer_pow log log1p max min mul neg pow rsqrt sin sqrt square sub tan "
@@ -35,22 +36,23 @@ def cost_table(problem: Problem, seed: int) -> pd.DataFrame:
     """
     import pandas as pd
 
-    chunk = make_chunk(problem, 0, BLOCKS, BLOCKS, BLOCKS * problem.block)
-    measurements = jax.jit(lambda lanes: jax.lax.map(partial(_measurements, problem, words(seed)), lanes))(
-        chunk.lanes
-    )
+    steps = problem.schedule.segments * problem.schedule.segment_steps * problem.block
+    blocks = max(1, min(MOST_BLOCKS, MOST_STEPS // steps))
+    chunk = make_chunk(problem, 0, blocks, blocks, blocks * problem.block)
+    data = jax.jit(lambda lanes: jax.lax.map(partial(trajectories, problem, words(seed)), lanes))(chunk.lanes)
     programs, compile_seconds = [], []
     for runner in problem.runners:
         begun = time.perf_counter()
-        programs.append(jax.jit(partial(_alone, problem, runner)).lower(measurements).compile())
+        programs.append(jax.jit(partial(_alone, problem, runner)).lower(data).compile())
         compile_seconds.append(time.perf_counter() - begun)
-    rounds = [[_seconds(program, measurements) for program in programs] for _ in range(ROUNDS)]
-    steps = problem.schedule.segments * problem.schedule.segment_steps * problem.block * BLOCKS
+    rounds = [[_seconds(program, data) for program in programs] for _ in range(ROUNDS)]
     counted = [operations(problem, runner) for runner in problem.runners]
     return pd.DataFrame(
         {
             "filter": [runner.label for runner in problem.runners],
-            "ns_per_step": [1e9 * statistics.median(times) / steps for times in zip(*rounds, strict=True)],
+            "ns_per_step": [
+                1e9 * statistics.median(times) / (steps * blocks) for times in zip(*rounds, strict=True)
+            ],
             "compile_seconds": compile_seconds,
             "operations_per_step": [step for step, _ in counted],
             "operations_per_update": [update for _, update in counted],
@@ -58,23 +60,19 @@ def cost_table(problem: Problem, seed: int) -> pd.DataFrame:
     )
 
 
-def _measurements(problem: Problem, seed: tuple[Any, Any], lanes: Any) -> Any:
-    return trajectories(problem, seed, lanes)[1]
+def _alone(problem: Problem, runner: Runner, data: Simulated) -> Any:
+    """One filter on the data of some blocks; a sum, so that nothing is left out."""
+
+    def block(data: Simulated) -> Any:
+        return jnp.sum(followed(problem, runner, data).components, axis=(0, 1))
+
+    return jax.lax.map(block, data)
 
 
-def _alone(problem: Problem, runner: Runner, measurements: Any) -> Any:
-    """One filter on given measurements (B, M, m, L); a sum, so that nothing is left out."""
-
-    def block(y: Any) -> Any:
-        return jnp.sum(follow(runner, problem.schedule, y, problem.block).components, axis=(0, 1))
-
-    return jax.lax.map(block, measurements)
-
-
-def _seconds(program: Any, measurements: Any) -> float:
-    jax.block_until_ready(program(measurements))  # not timed: it finds another program's data in the caches
+def _seconds(program: Any, data: Simulated) -> float:
+    jax.block_until_ready(program(data))  # not timed: it finds another program's data in the caches
     begun = time.perf_counter()
-    jax.block_until_ready(program(measurements))
+    jax.block_until_ready(program(data))
     return time.perf_counter() - begun
 
 

@@ -9,24 +9,23 @@ import jax.numpy as jnp
 
 if TYPE_CHECKING:
     from nlbench.engine.problem import Runner
+    from nlbench.filters.filter import Filter
     from nlbench.schedule import Schedule
 
 
 class Followed(NamedTuple):
-    """Unique components of mean, covariance and third moment in one axis, (T, k, L), the start first; and how many
-    updates the guard replaced, (L,)."""
+    """Unique components of mean, covariance and third moment in one axis, (T, k, L), the start first; how many updates
+    the guard replaced, (L,); and how many there were, (L,)."""
 
     components: Any
     guarded: Any
+    updates: Any
 
 
 def follow(runner: Runner, schedule: Schedule, measurements: Any, lanes: int) -> Followed:
     """The filter along the measurements (M, m, L) of a block."""
     filter = runner.filter
-    start = jax.tree.map(
-        lambda leaf: jnp.broadcast_to(jnp.asarray(leaf)[..., None], (*jnp.shape(leaf), lanes)),
-        filter.init(runner.initial),
-    )
+    start = spread(filter.init(runner.initial), lanes)
     span = runner.step * runner.steps
 
     def segment(number: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
@@ -53,18 +52,28 @@ def follow(runner: Runner, schedule: Schedule, measurements: Any, lanes: int) ->
             carry = segment(first, carry)
         else:
             carry = jax.lax.fori_loop(first, first + schedule.output_every, segment, carry)
-        return carry, emitted(carry[0])
-
-    def emitted(state: Any) -> Any:
-        components = over_lanes(filter.components)(state)
-        carried = [tensor for tensor in components[:3] if tensor is not None]
-        return jnp.stack(
-            [entry for tensor in carried for entry in tensor]
-        )  # inside the vmap it would be transposed
+        return carry, emitted(filter, carry[0])
 
     carry = (start, jnp.zeros(lanes, int))
     (_, guarded), outputs = jax.lax.scan(to_output, carry, jnp.arange(schedule.outputs))
-    return Followed(jnp.concatenate([emitted(start)[None], outputs]), guarded)
+    components = jnp.concatenate([emitted(filter, start)[None], outputs])
+    return Followed(components, guarded, jnp.full(lanes, schedule.measurements))
+
+
+def spread(state: Any, lanes: int) -> Any:
+    """The state of one trajectory in every lane."""
+    return jax.tree.map(
+        lambda leaf: jnp.broadcast_to(jnp.asarray(leaf)[..., None], (*jnp.shape(leaf), lanes)), state
+    )
+
+
+def emitted(filter: Filter, state: Any) -> Any:
+    """The components (k, L) of a block's state."""
+    components = over_lanes(filter.components)(state)
+    carried = [tensor for tensor in components[:3] if tensor is not None]
+    return jnp.stack(
+        [entry for tensor in carried for entry in tensor]
+    )  # inside the vmap it would be transposed
 
 
 def over_lanes(function: Any) -> Any:

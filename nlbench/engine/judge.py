@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from nlbench.algebra import Tensor, einsum, expand, inverse, positive_definite, zeros
 from nlbench.algebra.scalarise import scalarise
@@ -28,18 +29,18 @@ class Judged(NamedTuple):
     diverged: Any
 
 
-def judge(system: System, layout: Layout, states: Any, components: Any) -> Judged:
-    """Compare the true states (T, n, L) with the moments (T, k, L) that a filter gave at the same times."""
+def judge(rules: System, model: System, layout: Layout, states: Any, components: Any) -> Judged:
+    """Compare the true states (T, n, L) with the moments (T, k, L) that a filter gave at the same times.
+
+    rules: the system whose rules of divergence hold. model: the filter's, which says what the errors of its state are.
+    """
     each = jax.vmap(
-        jax.vmap(lambda x, given: _one(system, x, given))
+        jax.vmap(lambda x, given: _one(rules, model, x, given))
     )  # of scalars: arrays inside would be transposed
-    error, cov, third, nees, diverged = each(_apart(states), _apart(components))
+    apart = each(_apart(states), _apart(components))
+    error, cov, third = (jnp.stack(part, axis=1) for part in apart[:3])
     return Judged(
-        jnp.stack(error, axis=1),
-        jnp.stack(cov, axis=1),
-        jnp.stack(third, axis=1),
-        nees,
-        _lasting(system, layout, diverged),
+        error, cov, third, apart.nees, _late(rules, layout, error, _lasting(rules, layout, apart.diverged))
     )
 
 
@@ -47,14 +48,14 @@ def _apart(array: Any) -> list[Any]:
     return [array[:, place] for place in range(array.shape[1])]
 
 
-def _one(system: System, x: list[Any], given: list[Any]) -> Judged:
+def _one(rules: System, model: System, x: list[Any], given: list[Any]) -> Judged:
     """One trajectory at one time: n states, k components."""
-    mean, cov, third = _parted(given, system.states)
-    error, cov, third = _errors(system, x, mean, cov, third)
+    mean, cov, third = _parted(given, model.states)
+    error, cov, third = _errors(model, x, mean, cov, third)
     distance = einsum("i,i->", einsum("ij,j->i", inverse(cov), error), error)[()]
     lost = ~reduce(jnp.logical_and, map(jnp.isfinite, error))
-    if system.diverged is not None:
-        ((_, (rule,)),) = scalarise(system.diverged, list(error), dtype=float)
+    if rules.diverged is not None:
+        ((_, (rule,)),) = scalarise(rules.diverged, list(error), dtype=float)
         lost = lost | rule
     nees = jnp.where(positive_definite(cov), distance, jnp.nan)
     parts = [list(map(jnp.asarray, tensor)) for tensor in (error, cov, third)]
@@ -89,3 +90,14 @@ def _lasting(system: System, layout: Layout, diverged: Any) -> Any:
         return diverged
     reported = jnp.zeros(len(layout.times), bool).at[jnp.asarray(layout.reports)].set(True)
     return diverged | (jnp.cumsum(diverged & reported[:, None], axis=0) > 0)
+
+
+def _late(rules: System, layout: Layout, error: Any, diverged: Any) -> Any:
+    """A run whose errors were large over the last part of it has diverged at its end."""
+    late = rules.diverged_late
+    if late is None:
+        return diverged
+    times = np.asarray(layout.times)
+    window = times > times[-1] - late.window
+    square = sum(error[window, member] ** 2 for member in late.members)
+    return diverged.at[-1].set(diverged[-1] | (jnp.sqrt(square.mean(0)) > late.bound))

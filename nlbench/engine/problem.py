@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from nlbench import filters, schedule, systems
 from nlbench.errors import ConfigError
 from nlbench.moments.moments import Moments
+from nlbench.simulate import path
 from nlbench.statistics.layout import Layout
 from nlbench.systems.system import Coordinate, Sets, System
 
@@ -30,13 +32,19 @@ class Runner(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """Everything that a block's computation depends on, apart from the seed."""
+    """Everything that a block's computation depends on, apart from the seed.
+
+    truth: what makes the data. judged_by: whose coordinates and rules of divergence count. nominal_steps: ends of the
+    steps at which sightings are made, where the undisturbed motion decides it.
+    """
 
     truth: System
     runners: tuple[Runner, ...]
     schedule: Schedule
     layout: Layout
     block: int
+    judged_by: System
+    nominal_steps: tuple[int, ...] = ()
 
     @property
     def set_size(self) -> int:
@@ -49,11 +57,13 @@ def make(experiment: Experiment, own: System | None = None) -> Problem:
 
     Raises `ConfigError` where model and data do not fit each other.
     """
-    truth = own or systems.build(
+    stated = own or systems.build(
         experiment.system.name, **{**experiment.system.parameters, **experiment.truth}
     )
-    truth = truth.truth or truth
-    times = schedule.make(experiment.time.end, experiment.time.step, experiment.time.output, truth.interval)
+    truth = stated.truth or stated
+    end, step, output = experiment.time.end, experiment.time.step, experiment.time.output
+    sightings = truth.sightings.most(end) if truth.sightings else 0
+    times = schedule.make(end, step, output, truth.interval, sightings)
     runners = [_runner(experiment, spec, own, times) for spec in experiment.filters]
     if experiment.reference is not None:
         runners.append(_bound(experiment.reference, experiment.reference, truth, {}, truth.initial, times))
@@ -64,7 +74,21 @@ def make(experiment: Experiment, own: System | None = None) -> Problem:
                 f"{runner.label}: its model has {model.states} states and {model.measurements} measurements, "
                 f"the data {truth.states} and {truth.measurements}"
             )
-    return Problem(truth, tuple(runners), times, _layout(experiment, truth), experiment.engine.block)
+    layout, block = _layout(experiment, stated), experiment.engine.block
+    return Problem(truth, tuple(runners), times, layout, block, stated, _nominal_steps(truth, times))
+
+
+def _nominal_steps(truth: System, times: Schedule) -> tuple[int, ...]:
+    """When the motion from the initial mean reaches the angle of each sighting; never is a step after the last."""
+    if truth.sightings is None or not truth.sightings.nominal:
+        return ()
+    import jax
+
+    mean = np.asarray(truth.initial.mean, float)
+    states = jax.jit(lambda start: path(replace(truth, diffusion=None), times, None, start))(mean)
+    angles = np.unwrap(np.asarray(jax.vmap(truth.sightings.angle)(states)))
+    due = [float(truth.sightings.due(number)) for number in range(times.sightings)]
+    return tuple(int(step) + 1 for step in np.searchsorted(np.maximum.accumulate(angles), due))
 
 
 def _runner(experiment: Experiment, spec: FilterSpec, own: System | None, times: Schedule) -> Runner:

@@ -30,7 +30,8 @@ class Filter(NamedTuple):
 
     init: (moments, key=None) -> state.
     predict: (state, t0, t1, key=None) -> state.
-    update: (state, t, y, key=None) -> (state, UpdateInfo); NaN in y (m,) means that entry was not taken.
+    update: (state, t, y, key=None, sighting=None) -> (state, UpdateInfo); NaN in y (m,) means that entry was not taken.
+        sighting: number of the sighting that y is, where the system has `sightings`.
     moments: state -> Moments, full arrays.
     rates: (state, t, y=None) -> Moments, their time derivatives between measurements.
     integrate: (state, t, h, count) -> state, `count` steps of h from t; what `predict` and the engine call.

@@ -86,8 +86,16 @@ def steps_between(t0: Any, t1: Any, longest: float | None) -> tuple[Any, Any]:
 
 
 def _update(
-    system: System, row: Row, options: Options, state: Components, t: Any, y: Any, key: Any = None
+    system: System,
+    row: Row,
+    options: Options,
+    state: Components,
+    t: Any,
+    y: Any,
+    key: Any = None,
+    sighting: Any = None,
 ) -> tuple[Components, UpdateInfo]:
+    system = system if sighting is None else system.sighted(sighting)
     measurement = linearise(system, t, state, y, options.missing)
     gained = gain(state.cov, measurement)
     z = clipped = measurement.z

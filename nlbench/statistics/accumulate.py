@@ -152,5 +152,5 @@ def _divergence(lost: Array, mask: Array, tracks: Tracks) -> dict[str, Array]:
     return {
         "first_lost": (flagged & (before == 0)).sum(-1),
         "guarded": jnp.where(mask, tracks.guarded, 0).sum(-1),
-        "updates": mask.sum() * tracks.updates,
+        "updates": jnp.where(mask, tracks.updates, 0).sum(-1),
     }

@@ -80,7 +80,7 @@ def divergence_table(totals: Totals) -> pd.DataFrame:
     first_lost, guarded = groups["first_lost"].sum(0), groups["guarded"].sum(0)
     diverged = first_lost.sum(-1)
     low, high = wilson(diverged, totals.runs)
-    updates = np.broadcast_to(groups["updates"].sum(0), guarded.shape)
+    updates = groups["updates"].sum(0)
     return pd.DataFrame(
         {
             "filter": list(layout.filters),

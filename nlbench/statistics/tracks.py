@@ -20,4 +20,4 @@ class Tracks(NamedTuple):
     cross_third: Float[Array, "F R C3 L"]  # estimated third central moments
     diverged: Bool[Array, "F T L"]  # by the system's rule
     guarded: Int[Array, "F L"]  # updates in which the guard fired
-    updates: int | Int[Array, ""]  # updates per run
+    updates: Int[Array, "F L"]  # updates made

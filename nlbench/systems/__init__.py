@@ -14,6 +14,7 @@ OWN = "own"  # stands in experiments for a System that was given in Python
 MODULES = {
     "culver-scalar": "nlbench.systems.culver_scalar",
     "oscillator": "nlbench.systems.oscillator",
+    "lunar-orbit": "nlbench.systems.lunar_orbit",
     OWN: "nlbench.systems.own",
 }
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 if TYPE_CHECKING:
@@ -54,6 +55,53 @@ class KalmanBank(NamedTuple):
     spectrum: Any = None
 
 
+class Sightings(NamedTuple):
+    """Measurements made at angles of a revolution, instead of at times.
+
+    Sighting k, counted from 0, is due at the end of the first step at which the central angle, followed round and
+    round from the start, has reached angles[k mod p] + period (k div p): that of the estimate, or of the undisturbed
+    motion from the initial mean where `nominal`. What is measured is observe(marks[k mod p], x) and the noise of
+    number k. A filter makes one sighting a step at most.
+
+    angles, marks: (p,), ascending angles within a period, and what `observe` is told of each. rate: about how fast the
+    angle grows. angle: x -> the central angle, whole turns left out or not. observe: (mark, x) -> (m,).
+    """
+
+    angles: tuple[float, ...]
+    marks: tuple[float, ...]
+    period: float
+    rate: float
+    angle: Function
+    observe: Function
+    nominal: bool = False
+
+    def most(self, end: float) -> int:
+        """How many sightings are provided for until `end`: one and a quarter times the expected number, and some."""
+        return len(self.angles) * math.ceil(1.25 * self.rate * end / self.period + 1.0)
+
+    def due(self, number: Any) -> Any:
+        """The angle of sighting `number`."""
+        import jax.numpy as jnp
+
+        turn, place = number // len(self.angles), number % len(self.angles)
+        return jnp.asarray(self.angles)[place] + self.period * turn
+
+    def mark(self, number: Any) -> Any:
+        """What `observe` is told of sighting `number`."""
+        import jax.numpy as jnp
+
+        return jnp.asarray(self.marks)[number % len(self.marks)]
+
+
+class LateError(NamedTuple):
+    """A run diverges at its end if an error was large for long: the root mean square over the last `window` of the
+    norm of the errors `members` above `bound`."""
+
+    window: float
+    bound: float
+    members: tuple[int, ...]
+
+
 @dataclass(frozen=True)
 class System:
     """A continuous-time system dx = f dt + G dw, measured at discrete times or continuously.
@@ -71,13 +119,15 @@ class System:
     sample: key -> (n,) draws an initial state; or `Sets`, when initial states are drawn in sets.
     residual: (y, h) -> (m,), y - h unless given (to wrap an angle, say).
     coordinates: names and units of the errors; default x1 ... xn (x for one state).
-    error: (x, m) -> (c,) errors, truth minus estimate; default x - m.
+    error: (x, m) -> (c,) errors, true state minus estimate m of this system's state; default x - m.
     diverged: (c,) errors -> bool; default: never, apart from errors that are not finite.
     diverged_stays: whether a run diverged at a report time counts as diverged ever after.
+    diverged_late: a rule that is judged once, at the end of a run.
     clip: (c,) bound on |error| in `rms_clipped`; default infinite.
     inputs: t -> known inputs u(t), then drift takes (t, x, u).
     step: default integration step; None means a tenth of the interval.
-    interval: time between measurements; None means that nothing is measured.
+    interval: time between measurements; None means that nothing is measured, or only by sightings.
+    sightings: measurements that wait for an angle; `observe` then serves where no sighting's number is given.
     exact: what the exact reference is made of, where there is one.
     norms: named norms of the errors, each with the coordinates that it joins.
     """
@@ -96,10 +146,12 @@ class System:
     error: Function | None = None
     diverged: Function | None = None
     diverged_stays: bool = False
+    diverged_late: LateError | None = None
     clip: tuple[float, ...] | None = None
     inputs: Function | None = None
     step: float | None = None
     interval: float | None = None
+    sightings: Sightings | None = None
     exact: InitialGrid | KalmanBank | None = None
     norms: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
@@ -132,6 +184,12 @@ class System:
         G = jnp.asarray(self.diffusion(t, x))
         V = jnp.eye(G.shape[1]) if self.diffusion_cov is None else jnp.asarray(self.diffusion_cov)
         return G @ V @ G.T
+
+    def sighted(self, number: Any) -> System:
+        """The system as sighting `number` observes it."""
+        assert self.sightings is not None
+        mark, observe = self.sightings.mark(number), self.sightings.observe
+        return replace(self, observe=lambda t, x: observe(mark, x))
 
     def innovation(self, y: Any, h: Any) -> Any:
         """y - h, or what the system puts in its place: (m,)."""

@@ -92,7 +92,7 @@ def blocks(runs: Runs, updates: int = 7):
             part = array[..., start : start + real]
             rubbish = np.full((*part.shape[:-1], LANES - real), np.nan if part.dtype == float else 1)
             parts.append(np.concatenate([part, rubbish.astype(part.dtype)], axis=-1))
-        yield Tracks(*parts, updates), np.arange(LANES) < real
+        yield Tracks(*parts, np.full(parts[-1].shape, updates)), np.arange(LANES) < real
 
 
 _COMPILED: dict[str, Callable] = {}

@@ -1,0 +1,97 @@
+"""One filter over one block, with measurements that wait for an angle: each lane makes its own at its own step.
+
+The block is carried step by step until some lane's sighting is due, or an output; only then is the update computed,
+for all lanes, and kept in the lanes where it was due.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from nlbench.algebra import Tensor, expand
+from nlbench.engine.follow import Followed, emitted, over_lanes, spread
+from nlbench.orbit import wrapped
+
+if TYPE_CHECKING:
+    from nlbench.engine.problem import Problem, Runner
+    from nlbench.simulate import Simulated
+    from nlbench.systems.system import Sightings
+
+
+class Progress(NamedTuple):
+    """Of a block: steps made; the filter's state; per lane the angle followed so far, whether a sighting is due, how
+    many were made, and in how many the guard replaced the update."""
+
+    step: Any
+    state: Any
+    angle: Any
+    due: Any
+    made: Any
+    guarded: Any
+
+
+def follow_sightings(problem: Problem, runner: Runner, data: Simulated) -> Followed:
+    """The filter along the truth (steps + 1, n, L) of a block, whose sightings have the noise (K, m, L)."""
+    schedule, lanes, filter = problem.schedule, problem.block, runner.filter
+    seen, truth = filter.system.sightings, problem.truth.sightings
+    if seen is None or truth is None:
+        raise ValueError("a schedule with sightings needs a system that says what they are")
+
+    def advanced(before: Progress) -> Progress:
+        t = before.step * schedule.step
+        state = over_lanes(lambda state: filter.integrate(state, t, runner.step, runner.steps))(before.state)
+        step = before.step + 1
+        if problem.nominal_steps:
+            due = step >= jnp.asarray(problem.nominal_steps)[jnp.minimum(before.made, schedule.sightings - 1)]
+            angle = before.angle
+        else:
+            now = over_lanes(lambda state: _angle(seen, filter.components(state).mean))(state)
+            angle = before.angle + wrapped(now - before.angle)
+            due = angle >= seen.due(before.made)
+        return before._replace(
+            step=step, state=state, angle=angle, due=due & (before.made < schedule.sightings)
+        )
+
+    def measured(before: Progress) -> Progress:
+        t, x = before.step * schedule.step, data.states[before.step]
+        number = jnp.minimum(before.made, schedule.sightings - 1)
+        noise = jnp.take_along_axis(data.noise, number[None, None], axis=0)[0]
+        y = over_lanes(lambda number, x, noise: truth.observe(truth.mark(number), x) + noise)(
+            number, x, noise
+        )
+        updated, info = over_lanes(lambda state, y, number: filter.update(state, t, y, sighting=number))(
+            before.state, y, number
+        )
+        due = before.due
+        return before._replace(
+            state=jax.tree.map(lambda new, old: jnp.where(due, new, old), updated, before.state),
+            due=jnp.zeros_like(due),
+            made=before.made + due,
+            guarded=before.guarded + (info.guarded & due),
+        )
+
+    def to_output(before: Progress, output: Any) -> tuple[Progress, Any]:
+        last = (output + 1) * schedule.output_every
+
+        def leg(before: Progress) -> Progress:
+            waiting = lambda now: (now.step < last) & ~jnp.any(now.due)  # noqa: E731
+            now = jax.lax.while_loop(waiting, advanced, before)
+            return jax.lax.cond(jnp.any(now.due), measured, lambda now: now, now)
+
+        after = jax.lax.while_loop(lambda now: now.step < last, leg, before)
+        return after, emitted(filter, after.state)
+
+    state = spread(filter.init(runner.initial), lanes)
+    none = jnp.zeros(lanes, int)
+    start = Progress(jnp.asarray(0), state, jnp.zeros(lanes), jnp.zeros(lanes, bool), made=none, guarded=none)
+    end, outputs = jax.lax.scan(to_output, start, jnp.arange(schedule.outputs))
+    components = jnp.concatenate([emitted(filter, state)[None], outputs])
+    return Followed(components, end.guarded, end.made)
+
+
+def _angle(sightings: Sightings, mean: Tensor) -> Any:
+    """The central angle of the mean, an array only for it to look at."""
+    return expand(lambda t, x: jnp.stack([sightings.angle(x)]), 0.0, list(mean), 0).value[0]
