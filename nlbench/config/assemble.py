@@ -71,6 +71,7 @@ def assemble(raw: Mapping[str, Any], question: str = "") -> tuple[Experiment | N
     findings += consistency.times(time, reports, system, filters, parts["truth"])
     findings += consistency.labels(labels, len(entries))
     findings += consistency.claims(claims, labels, reports)
+    findings += consistency.traces(head, parts["monte_carlo"])
     if findings or head is None or reports is None:
         return None, findings
     parts["claims"] = [each.model_copy(update={"at": each.at or reports}) for each in claims if each]

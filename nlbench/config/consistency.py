@@ -1,4 +1,4 @@
-"""Checks of the sections of an experiment against each other: times, labels, claims."""
+"""Checks of the sections of an experiment against each other: times, labels, claims, traced runs."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from nlbench.config.explain import Finding
-from nlbench.config.schema import Claim, FilterSpec, Head, SystemSpec, TimeSpec
+from nlbench.config.schema import Claim, FilterSpec, Head, MonteCarlo, SystemSpec, TimeSpec
 from nlbench.suggestions import suggestion
 
 MOST_OUTPUTS = 100_000
@@ -123,6 +123,21 @@ def claims(
                 )
                 at = ("claims", index, "at", position)
                 findings.append(Finding(at, f"{time:g} is not one of the report_times ({listed})"))
+    return findings
+
+
+def traces(head: Head | None, monte_carlo: MonteCarlo | None) -> list[Finding]:
+    """Traced runs are runs of this experiment, each named once."""
+    findings = []
+    numbers = head.traces if head else []
+    for index, number in enumerate(numbers):
+        at = ("traces", index)
+        if monte_carlo and number >= monte_carlo.runs:
+            findings.append(
+                Finding(at, f"there is no run {number:,}; they are 0 to {monte_carlo.runs - 1:,}")
+            )
+        elif number in numbers[:index]:
+            findings.append(Finding(at, f"run {number:,} stands twice"))
     return findings
 
 

@@ -14,6 +14,7 @@ STEM = re.compile(r"[a-z0-9][a-z0-9_.-]*")
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
+RunNumber = Annotated[int, Field(ge=0)]
 Statistic = Literal[
     "rms",
     "rms_clipped",
@@ -26,7 +27,7 @@ Statistic = Literal[
     "nees",
     "coverage_95",
 ]
-Figure = Literal["rms", "rms_clipped", "mean_error", "variance", "third_moment", "divergence"]
+Figure = Literal["rms", "rms_clipped", "mean_error", "variance", "third_moment", "divergence", "trace"]
 
 
 def _path_like(name: str) -> str:
@@ -66,6 +67,11 @@ class Head(Section):
     )
     figures: list[Figure] | None = Field(
         default=None, description="kinds of figures to draw; default: all that apply"
+    )
+    traces: list[RunNumber] = Field(
+        default_factory=list,
+        max_length=32,
+        description="numbers of runs, from 0, whose errors are saved at all output times and drawn",
     )
 
 
@@ -201,6 +207,7 @@ class Experiment(Section):
     engine: EngineSpec = EngineSpec()
     limits: Limits = Limits()
     figures: list[Figure] | None = None
+    traces: list[RunNumber] = Field(default_factory=list)
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -227,7 +234,8 @@ class Experiment(Section):
         return to_yaml(self.resolved(), self.question)
 
     def hash12(self) -> str:
-        """Identifies results that may be mixed: all counts but how many runs and how computed."""
+        """Identifies results that may be mixed: all counts but how many runs, which are traced, and how computed."""
         plain = self.resolved()
         del plain["monte_carlo"]["runs"], plain["engine"]["chunk"], plain["engine"]["threads"]
+        del plain["traces"]
         return canonical_hash(plain)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from nlbench import runtime
 from nlbench.config.schema import SystemSpec
 from nlbench.engine.compiled import CAPACITY, Compiled, compile_chunks
-from nlbench.engine.finish import write
+from nlbench.engine.finish import up_to_date, write
 from nlbench.engine.interruption import stop_requests
 from nlbench.engine.problem import make
 from nlbench.engine.resume import checkpoint, finished_runs, resumed, sound
@@ -49,7 +49,7 @@ def _run(
     with folder.locked():
         done = finished_runs(folder)
         runs = max(experiment.monte_carlo.runs, done or 0)
-        if done == runs and sound(folder):
+        if done == runs and sound(folder) and up_to_date(folder, experiment):
             return Results(folder.path)
         begun = time.perf_counter()
         compiled = compiled or compile_chunks(problem, experiment.monte_carlo.seed)

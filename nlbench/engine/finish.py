@@ -1,4 +1,4 @@
-"""The end of a run: tables, claims, costs and the manifest."""
+"""The end of a run: tables, claims, traces, costs and the manifest."""
 
 from __future__ import annotations
 
@@ -8,14 +8,22 @@ from typing import TYPE_CHECKING
 from nlbench.engine.compiled import Compiled
 from nlbench.engine.cost import cost_table
 from nlbench.engine.resume import device, numerics
-from nlbench.results.folder import RunFolder
+from nlbench.engine.trace import traces
+from nlbench.results.atomic import remove
+from nlbench.results.folder import TABLES, RunFolder
 from nlbench.results.manifest import commit, versions
+from nlbench.results.results import Results
 from nlbench.statistics.claims import evaluate
 from nlbench.statistics.summary import tables
 from nlbench.statistics.totals import Totals
 
 if TYPE_CHECKING:
     from nlbench.config import Experiment
+
+
+def up_to_date(folder: RunFolder, experiment: Experiment) -> bool:
+    """Whether the traces of a finished run are those asked for, which may change without changing its hash."""
+    return Results(folder.path).experiment.traces == experiment.traces
 
 
 def write(
@@ -31,7 +39,11 @@ def write(
     made = tables(totals)
     if experiment.claims:
         made["claims"] = evaluate(experiment.claims, made["statistics"], made["paired"])
+    if experiment.traces:
+        made["traces"] = traces(compiled, experiment.traces, threads)
     made["cost"] = cost_table(problem, experiment.monte_carlo.seed)
+    for left in (folder.path / TABLES).glob("traces.*"):  # of runs that are no longer traced
+        remove(left)
     folder.write_tables(made)
     folder.finish(
         totals.runs,

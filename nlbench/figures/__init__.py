@@ -13,6 +13,7 @@ from nlbench.figures.divergence import divergence
 from nlbench.figures.error_curves import mean_error, rms, rms_clipped
 from nlbench.figures.moment_curves import third_moment, variance
 from nlbench.figures.picture import Picture, png, settle, svg
+from nlbench.figures.traces import trace
 from nlbench.results.atomic import atomic_write, remove
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ FIGURES: dict[str, Callable[[Data], Iterator[Picture]]] = {
     "variance": variance,
     "third_moment": third_moment,
     "divergence": divergence,
+    "trace": trace,
 }
 
 

@@ -32,6 +32,7 @@ class Data(NamedTuple):
     curves: dict[tuple[str, str, str], Curve]
     paired: pd.DataFrame
     divergence: pd.DataFrame
+    traces: pd.DataFrame
 
     def coordinates(self, statistic: str) -> tuple[str, ...]:
         """Coordinates (and named norms) for which the statistic was saved at more than one time, in table order."""
@@ -72,6 +73,9 @@ def read(results: Results) -> Data:
         curves=curves,
         paired=results.table("paired"),
         divergence=results.table("divergence"),
+        traces=results.table("traces")
+        if "traces" in results.tables
+        else pd.DataFrame(columns=["trajectory"]),
     )
 
 

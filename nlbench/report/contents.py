@@ -8,6 +8,7 @@ from urllib.parse import quote
 
 from nlbench.figures import bands, data
 from nlbench.report import tables, winners
+from nlbench.report.moments import moments
 from nlbench.report.numbers import duration, measured, percent, plain
 from nlbench.report.pictures import embedded
 
@@ -22,7 +23,7 @@ def contents(results: Results, drawn: list[Path]) -> dict[str, Any]:
     statistic = "rms_clipped" if read.any_diverged else "rms"
     found = winners.winners(read, statistic)
     last = max((winner.time for winner in found), default=0.0)
-    optional = {name: results.table(name) for name in ("claims", "cost") if name in results.tables}
+    optional = {name: results.table(name) for name in ("claims", "cost", "moments") if name in results.tables}
     return {
         "question": experiment.question or experiment.experiment,
         "experiment": experiment.experiment,
@@ -40,6 +41,7 @@ def contents(results: Results, drawn: list[Path]) -> dict[str, Any]:
         "divergence": tables.divergence(read),
         "cost": tables.cost(optional["cost"]) if "cost" in optional else None,
         "figures": embedded(drawn),
+        "moments": moments(optional["moments"], read) if "moments" in optional else None,
         "parameters": experiment.resolved_yaml(),
         "environment": _environment(results.manifest),
         "files": [link(results, path) for path in _files(results)],

@@ -25,6 +25,15 @@ def uncertain(value: float, stderr: float) -> str:
     return f"{scaled} × 10{str(exponent).translate(POWERS)}"
 
 
+def scientific(value: float, digits: int = 5) -> str:
+    """`2.8723 × 10⁶`: always one digit before the point, so that the entries of a table are alike."""
+    if not math.isfinite(value):
+        return "–" if math.isnan(value) else "infinite"
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    power = f" × 10{str(int(exponent)).translate(POWERS)}" if int(exponent) else ""
+    return f"{mantissa}{power}".replace("-", "−")
+
+
 def plain(value: float, digits: int = 4) -> str:
     """A number to some digits; a whole number to all."""
     if not math.isfinite(value):

@@ -9,7 +9,10 @@ from nlbench.statistics.uncertainty import JACKKNIFE_GROUPS, Sums, jackknife
 
 
 def moments_table(totals: Totals) -> pd.DataFrame:
-    """`filter, time, indices, estimated, actual, stderr, n`: indices from 1, stderr is that of `actual`."""
+    """`filter, time, indices, estimated, actual, stderr, n, names`.
+
+    indices: of the coordinates, from 1 (`1,2`); names: what these are called. stderr is that of `actual`.
+    """
     layout, groups = totals.layout, totals.groups
     pairs, triples = layout.components(2), layout.components(3)
     reports = list(layout.reports)
@@ -38,18 +41,20 @@ def moments_table(totals: Totals) -> pd.DataFrame:
         stderr = unit * jackknife(actual_of, sums, np.broadcast_to(alive, (*alive.shape[:-1], len(unit))))
     else:
         stderr = _influence_stderr(totals)
-    names = [",".join(str(i + 1) for i in component) for component in pairs + triples]
+    numbered = [",".join(str(i + 1) for i in component) for component in pairs + triples]
+    named = [" · ".join(layout.coordinates[i] for i in component) for component in pairs + triples]
     shape = actual.shape
     filters, times, indices = np.indices(shape).reshape(3, -1)
     return pd.DataFrame(
         {
             "filter": np.array(layout.filters, object)[filters],
             "time": np.array(layout.report_times)[times],
-            "indices": np.array(names, object)[indices],
+            "indices": np.array(numbered, object)[indices],
             "estimated": estimated.ravel(),
             "actual": (unit * actual).ravel(),
             "stderr": stderr.ravel(),
             "n": np.broadcast_to(total["n"], shape).astype(np.int64).ravel(),
+            "names": np.array(named, object)[indices],
         }
     )
 

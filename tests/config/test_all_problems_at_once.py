@@ -150,6 +150,21 @@ def test_initial_moments_must_be_moments(tmp_path, initial, message):
     assert f"initial: {message}" in complaint(tmp_path, f"{VALID}initial: {initial}\n")
 
 
+@pytest.mark.parametrize(
+    ("traces", "message"),
+    [
+        ("[0, 20_000]", "traces.1: there is no run 20,000; they are 0 to 19,999"),
+        ("[7, 8, 7]", "traces.2: run 7 stands twice"),
+        ("[-1]", "traces.0: expected a whole number of at least 0, found -1"),
+        ("[1.5]", "traces.0: expected a whole number of at least 0, found 1.5"),
+        ("5", "traces: expected a list of at most 32 entries, found 5"),
+        (str(list(range(33))), "traces: expected a list of at most 32 entries, found a list of 33"),
+    ],
+)
+def test_traced_runs_must_be_runs(tmp_path, traces, message):
+    assert message in complaint(tmp_path, f"{VALID}traces: {traces}\n")
+
+
 def test_an_option_of_the_command_line_is_named_as_the_place(tmp_path):
     text = complaint(tmp_path, VALID, "monte_carlo.run=5", "time.step=-1", "filters.9.limiter=1", "nonsense")
     assert "--set nonsense: expected key=value" in text

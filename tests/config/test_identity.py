@@ -13,15 +13,20 @@ def loaded(folder, text=VALID, *overrides):
 
 
 def test_the_resolved_file_loads_as_the_same_experiment(tmp_path):
-    experiment = loaded(tmp_path, VALID + "truth: {measurement_variance: 2}\ninitial: {variance: 1e-7}\n")
+    experiment = loaded(
+        tmp_path, VALID + "truth: {measurement_variance: 2}\ninitial: {variance: 1e-7}\ntraces: [5, 0]\n"
+    )
     again = load(written(tmp_path, experiment.resolved_yaml(), "config.resolved.yaml"))
     assert again == experiment
+    assert again.traces == [5, 0]
     assert again.hash12() == experiment.hash12()
     assert again.resolved_yaml() == experiment.resolved_yaml()
 
 
-@pytest.mark.parametrize("tuning", ["monte_carlo.runs=7", "engine.chunk=3", "engine.threads=1"])
-def test_runs_and_tuning_do_not_change_the_hash(tmp_path, tuning):
+@pytest.mark.parametrize(
+    "tuning", ["monte_carlo.runs=7", "engine.chunk=3", "engine.threads=1", "traces=[0, 5]"]
+)
+def test_runs_traces_and_tuning_do_not_change_the_hash(tmp_path, tuning):
     assert loaded(tmp_path, VALID, tuning).hash12() == loaded(tmp_path).hash12()
 
 

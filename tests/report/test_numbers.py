@@ -36,6 +36,23 @@ def test_plain_numbers(value, text):
 
 
 @pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (2872300.0, 5, "2.8723 × 10⁶"),
+        (-0.2079, 5, "−2.0790 × 10⁻¹"),
+        (9.99999, 5, "1.0000 × 10¹"),
+        (0.0, 5, "0.0000"),
+        (1.25, 2, "1.2"),
+        (-3e-310, 2, "−3.0 × 10⁻³¹⁰"),
+        (math.nan, 5, "–"),
+        (-math.inf, 5, "infinite"),
+    ],
+)
+def test_scientific_numbers(value, digits, text):
+    assert numbers.scientific(value, digits) == text
+
+
+@pytest.mark.parametrize(
     ("fraction", "text"),
     [(0, "0"), (0.0004, "0.040"), (0.051, "5.1"), (0.47, "47"), (0.0999999, "10"), (1.0, "100")],
 )

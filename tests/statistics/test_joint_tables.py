@@ -16,7 +16,7 @@ def test_every_table_has_the_columns_of_the_contract(sample):
     tables = summary.tables(sample[2])
     columns = {name: list(table.columns) for name, table in tables.items()}
     assert columns.keys() == {"statistics", "moments", "paired", "divergence", "runs"}
-    assert columns["moments"] == ["filter", "time", "indices", "estimated", "actual", "stderr", "n"]
+    assert columns["moments"] == ["filter", "time", "indices", "estimated", "actual", "stderr", "n", "names"]
     assert columns["paired"] == [
         *("filter_a", "filter_b", "time", "coordinate", "statistic", "difference", "stderr", "n", "p_value"),
     ]
@@ -40,6 +40,7 @@ def test_cross_moments_equal_numpy(sample):
         own = (runs.cov, runs.cross_third)[len(component) - 2][f, layout.reports.index(t)]
         estimated = own[layout.components(len(component)).index(component)][good].mean()
         assert row["n"] == good.sum()
+        assert row["names"] == " · ".join(layout.coordinates[i] for i in component)
         assert row["actual"] == pytest.approx(
             np.prod(x[list(component)], axis=0).mean(), rel=1e-10, abs=1e-13
         )
