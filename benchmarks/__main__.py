@@ -1,4 +1,4 @@
-"""`python -m benchmarks`: time nlbench against a C kernel, plain jax and other libraries."""
+"""`python -m benchmarks`: time nlbench against C kernels, plain jax and other libraries."""
 
 from __future__ import annotations
 
@@ -12,42 +12,57 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+TABLES = ("scalar", "oscillator", "orbit", "libraries")
+
 
 def main() -> None:
     """Parse, time, print."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument(
+        "tables", nargs="*", metavar="TABLE", help=f"any of {', '.join(TABLES)}; default: all"
+    )
     parser.add_argument(
         "--rounds", type=int, default=21, help="interleaved rounds (at least 15 for numbers to be told)"
     )
     parser.add_argument("--core", type=int, help="core to run on (default: the last one of this process)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write one line of JSON per row")
     options = parser.parse_args()
+    for unknown in set(options.tables) - set(TABLES):
+        parser.error(f"no table '{unknown}'; there are {', '.join(TABLES)}")
     core = pin(options.core)
 
     from nlbench import runtime
 
     runtime.configure(precision="float64", threads=1)
-    from benchmarks import ours, peers, rows, table, workloads
-
     machine = describe(core)
     print(
         f"{machine['processor']}, core {core}, load {machine['load']:.2f}; {options.rounds} rounds, float64"
     )
-    filters = [
-        rows.c_filter,
-        rows.c_peak,
-        ours.third_order,
-        rows.plain_third_order,
-        rows.c_experiment,
-        ours.simulated,
-        ours.engine,
-    ]
-    libraries = [ours.ekf, rows.plain_ekf, peers.dynamax, peers.filterpy]
+    lines = []
     with empty_cache():
-        lines = table.measure(workloads.SCALAR, filters, options.rounds)
-        lines += table.measure(workloads.OSCILLATOR, libraries, options.rounds)
+        for name in options.tables or TABLES:
+            lines += timed(name, options.rounds)
     if options.json:
         options.json.write_text("".join(json.dumps(line) + "\n" for line in [machine, *lines]))
+
+
+def timed(name: str, rounds: int) -> list[dict[str, Any]]:
+    """One table, by its name in `TABLES`."""
+    from benchmarks import ours, peers, rows, table, workloads
+
+    if name == "libraries":
+        libraries = [ours.ekf, rows.plain_ekf, peers.dynamax, peers.filterpy]
+        return table.measure(workloads.OSCILLATOR, libraries, rounds)
+    filters = [rows.c_filter, rows.c_peak, ours.third_order, rows.plain_third_order]
+    whole = [rows.c_experiment, ours.simulated, ours.engine]
+    if name == "orbit":
+        return table.measure(workloads.ORBIT, filters + whole, rounds)
+    orders = [rows.c_second, ours.second_order]
+    workload, published = {
+        "scalar": (workloads.SCALAR, 2.0),
+        "oscillator": (workloads.OSCILLATOR_THIRD, 5.2),
+    }[name]
+    return table.measure(workload, filters + whole + orders, rounds, published)
 
 
 @contextmanager

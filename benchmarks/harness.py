@@ -20,7 +20,8 @@ SAMPLE_SECONDS = 0.01  # a sample repeats its call until it takes about this lon
 class Timing(NamedTuple):
     """A row's times: nanoseconds per trajectory x RK4 step, and its ratio to the base row of the same round.
 
-    low, high: the middle 80 % of the rounds' ratios. share: processor time over wall time.
+    low, high: the middle 80 % of the rounds' ratios. share: processor time over wall time. samples: nanoseconds in
+    each round.
     """
 
     name: str
@@ -31,6 +32,11 @@ class Timing(NamedTuple):
     share: float
     rounds: int
     compile_seconds: float
+    samples: tuple[float, ...]
+
+    def over(self, other: Timing) -> float:
+        """The median of the ratios, within rounds, to another row timed with it."""
+        return float(np.median(np.divide(self.samples, other.samples)))
 
 
 def interleave(rows: Sequence[Row], rounds: int) -> list[Timing]:
@@ -59,6 +65,7 @@ def interleave(rows: Sequence[Row], rounds: int) -> list[Timing]:
             share=float(np.median(samples[:, i, 0] / samples[:, i, 1])),
             rounds=rounds,
             compile_seconds=row.compile_seconds,
+            samples=tuple(nanoseconds[:, i].tolist()),
         )
         for i, row in enumerate(arms)
     ]

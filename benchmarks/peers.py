@@ -55,6 +55,8 @@ def filterpy(workload: Workload, y: np.ndarray) -> Row:
     class Filter(ExtendedKalmanFilter):
         """filterpy asks for the nonlinear transition in this method."""
 
+        x: Any
+
         def predict_x(self, u: Any = 0) -> None:
             self.x = transition(self.x)
 

@@ -68,7 +68,10 @@ def ekf(workload: Workload) -> Callable[[Any], tuple[Any, Any]]:
 def linearised(workload: Workload, m: Any, P: Any, y: Any) -> tuple[Any, Any, Any]:
     """H, the residual, and the inverse of the innovation covariance."""
     H = jax.jacfwd(lambda x: workload.observe(jnp, x))(m)
-    return H, y - workload.observe(jnp, m), jnp.linalg.inv(H @ P @ H.T + workload.noise_cov)
+    z = y - workload.observe(jnp, m)
+    if workload.wrapped:
+        z = z - 2 * jnp.pi * jnp.round(z / (2 * jnp.pi))
+    return H, z, jnp.linalg.inv(H @ P @ H.T + workload.noise_cov)
 
 
 def symmetrised(T: Any) -> Any:

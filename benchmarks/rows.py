@@ -8,10 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks import native, workloads
+from benchmarks import native
 from benchmarks.workloads import Workload
 
 SEED = 1969
+THIRD_IN_C, SECOND_IN_C = "C, filter alone", "C, second-order filter"
+THIRD_BY_US, SECOND_BY_US = "nlbench, filter alone", "nlbench, second-order filter"
+SIMULATED_IN_C, SIMULATED_BY_US = "C, with random numbers and truth", "nlbench, with random numbers and truth"
+PLAIN = "plain jax arrays"
 
 
 class Row(NamedTuple):
@@ -33,56 +37,49 @@ class Unavailable(Exception):
 
 
 def c_filter(workload: Workload, y: np.ndarray) -> Row:
-    """The limit: hand-written C, given measurements."""
-    kernel = _kernel()
-    blocks = native.aligned((workload.blocks, workload.times, native.BLOCK))
-    blocks[:] = workloads.by_blocks(y)[:, :, 0]
-    out = native.outputs(blocks)
+    """The limit: C, given measurements."""
+    return _c_filter(THIRD_IN_C, 3, workload, y)
 
-    def call() -> None:
-        native.run_filter(kernel, blocks, workload.noise_cov[0, 0], out)
 
-    call()
-    means = out[:, -1, 0].reshape(-1, 1).copy()
-    return Row("C, filter alone", call, workload.work, kernel.compile_seconds, means)
+def c_second(workload: Workload, y: np.ndarray) -> Row:
+    """The second-order filter in C."""
+    return _c_filter(SECOND_IN_C, 2, workload, y)._replace(means=None)
 
 
 def c_peak(workload: Workload, y: np.ndarray) -> Row:
     """The filter's operations at the core's peak: its ratio is the fraction of the peak that is reached."""
-    kernel = _kernel()
-    operations = native.OPERATIONS_PER_STEP + native.OPERATIONS_PER_UPDATE / workload.steps
+    kernel = _kernel(workload, 3)
+    operations = kernel.text.operations_per_step + kernel.text.operations_per_update / workload.steps
 
     def call() -> int:
         return native.run_peak(kernel, rounds=40_000)
 
-    return Row("as many operations at the core's peak", call, call() / operations, kernel.compile_seconds)
+    return Row(f"its {operations:.0f} operations a step at the core's peak", call, call() / operations, 0.0)
 
 
 def c_experiment(workload: Workload, y: np.ndarray) -> Row:
     """The filter in C with random numbers and truth of its own."""
-    kernel = _kernel()
-    out = native.aligned((workload.blocks, workload.times, 3, native.BLOCK))
+    kernel = _kernel(workload, 3)
+    out = native.moments(kernel, workload.blocks, workload.times)
 
     def call() -> None:
-        native.run_experiment(kernel, workload.noise_cov[0, 0], SEED, 0, out)
+        native.run_experiment(kernel, SEED, 0, out)
 
-    return Row("C, with random numbers and truth", call, workload.work, kernel.compile_seconds)
+    return Row(SIMULATED_IN_C, call, workload.work, kernel.compile_seconds)
 
 
 def plain_third_order(workload: Workload, y: np.ndarray) -> Row:
     """Arrays, jacfwd and hessian, einsum, scan, vmap."""
     from benchmarks import plain
 
-    return jax_row(
-        "plain jax arrays", workload, plain.third_order(workload), y, lambda moments: moments[0][:, -1]
-    )
+    return jax_row(PLAIN, workload, plain.third_order(workload), y, lambda moments: moments[0][:, -1])
 
 
 def plain_ekf(workload: Workload, y: np.ndarray) -> Row:
     """The same for the EKF."""
     from benchmarks import plain
 
-    return jax_row("plain jax arrays", workload, plain.ekf(workload), y, lambda moments: moments[0][:, -1])
+    return jax_row(PLAIN, workload, plain.ekf(workload), y, lambda moments: moments[0][:, -1])
 
 
 def jax_row(name: str, workload: Workload, function: Any, y: Any, last_means: Callable[[Any], Any]) -> Row:
@@ -97,8 +94,22 @@ def jax_row(name: str, workload: Workload, function: Any, y: Any, last_means: Ca
     return Row(name, lambda: jax.block_until_ready(compiled(y)), workload.work, seconds, means)
 
 
-def _kernel() -> native.Kernel:
+def _c_filter(name: str, order: int, workload: Workload, y: np.ndarray) -> Row:
+    kernel = _kernel(workload, order)
+    blocks = native.measured(y)
+    out = native.moments(kernel, workload.blocks, workload.times)
+
+    def call() -> None:
+        native.run_filter(kernel, blocks, out)
+
+    call()
+    n = len(workload.mean)
+    means = np.moveaxis(out[:, -1, :n], 1, -1).reshape(-1, n)
+    return Row(name, call, workload.work, kernel.compile_seconds, means)
+
+
+def _kernel(workload: Workload, order: int) -> native.Kernel:
     try:
-        return native.fastest()
+        return native.fastest(workload, order)
     except native.CompilerMissing as reason:
         raise Unavailable(str(reason)) from reason

@@ -1,35 +1,47 @@
-"""The two workloads: a problem, its filter's start, and measurements of it, in plain NumPy."""
+"""The workloads: a problem, its filter's start, and measurements of it, in plain NumPy."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 LANES = 64
+BOUND = 2.1  # of the `bounded` draws, in standard deviations
+BEFORE = 1.2509323795  # the deviation of a normal variable that has variance one after it is cut at BOUND
+MU = 1.66935e14  # ft^3/s^2, the moon's attraction
+MOON = 5.70e6  # ft, its radius
+LANDMARK = (MOON * math.cos(math.radians(45.0)), MOON * math.sin(math.radians(45.0)))
 
 
 class Workload(NamedTuple):
     """A problem with `times` measurements of each of `blocks` x 64 trajectories, `steps` RK4 steps apart.
 
+    So few blocks that what the C kernels write stays in a core's cache of 1 MB: they would otherwise wait for memory.
+
+    system: key of `models.MODELS`, from which the C kernels are written.
     drift and observe: array functions of x (n,), in a module of arrays (numpy or jax.numpy) that comes first.
-    noise_cov: (m, m). mean (n,), cov (n, n): what the filters start from.
-    draw: (generator, count) -> (count, n), initial states.
+    noise_cov: (m, m), diagonal. mean (n,), cov (n, n), diagonal: what the filters start from, and true states too.
+    bounded: states whose normal draws are cut at 2.1 deviations, the variance staying `cov`; a filter then follows all.
+    wrapped: whether what is measured is an angle.
     """
 
     name: str
+    system: str
     says: str
     drift: Callable[[Any, Any], Any]
     observe: Callable[[Any, Any], Any]
     noise_cov: np.ndarray
     mean: np.ndarray
     cov: np.ndarray
-    draw: Callable[[np.random.Generator, int], np.ndarray]
+    bounded: tuple[int, ...]
     step: float
     steps: int
     times: int
     blocks: int
+    wrapped: bool = False
 
     @property
     def trajectories(self) -> int:
@@ -42,42 +54,72 @@ class Workload(NamedTuple):
         return self.trajectories * self.times * self.steps
 
 
+def _attraction(xp: Any, x: Any) -> Any:
+    """Planar two-body motion, (x, y, their rates)."""
+    square = x[0] * x[0] + x[1] * x[1]
+    pull = -MU / (square * xp.sqrt(square))
+    return xp.stack([x[2], x[3], pull * x[0], pull * x[1]])
+
+
 SCALAR = Workload(
     name="scalar third order",
+    system="scalar",
     says="dx/dt = -2x + .7x^2, y = x + N(0, 1.6) every 5 RK4 steps; third-order filter",
     drift=lambda xp, x: xp.stack([x[0] * (0.7 * x[0] - 2.0)]),
     observe=lambda xp, x: x,
     noise_cov=np.array([[1.6]]),
     mean=np.array([2.0]),
     cov=np.array([[0.16]]),
-    draw=lambda generator, count: 2.0 + np.clip(0.4 * generator.standard_normal((count, 1)), -0.84, 0.84),
+    bounded=(0,),
     step=0.02,
     steps=5,
     times=20,
-    blocks=32,
+    blocks=16,
 )
 OSCILLATOR = Workload(
     name="oscillator EKF",
+    system="oscillator",
     says="x1' = x2, x2' = -x1 - 2 x2 x3, x3' = 0, x1 and x2 measured after each RK4 step; EKF",
     drift=lambda xp, x: xp.stack([x[1], -x[0] - 2.0 * x[1] * x[2], 0.0 * x[2]]),
     observe=lambda xp, x: x[:2],
     noise_cov=50.0 * np.eye(2),
     mean=np.array([10.0, 0.0, 0.5]),
     cov=np.diag([9.0, 9.0, 0.16]),
-    draw=lambda generator, count: (
-        np.array([10.0, 0.0, 0.5]) + np.array([3.0, 3.0, 0.2]) * generator.standard_normal((count, 3))
-    ),
+    bounded=(2,),
     step=0.05,
     steps=1,
     times=100,
     blocks=16,
+)
+OSCILLATOR_THIRD = OSCILLATOR._replace(
+    name="oscillator third order",
+    says="x1' = x2, x2' = -x1 - 2 x2 x3, x3' = 0, x1 and x2 measured every 4 RK4 steps; third-order filter",
+    steps=4,
+    times=25,
+    blocks=4,
+)
+ORBIT = Workload(
+    name="orbit third order",
+    system="orbit",
+    says="planar two-body motion, a landmark's direction measured every 20 RK4 steps; third-order filter",
+    drift=_attraction,
+    observe=lambda xp, x: xp.stack([xp.arctan2(LANDMARK[1] - x[1], LANDMARK[0] - x[0])]),
+    noise_cov=np.array([[2.5e-5]]),
+    mean=np.array([8.34e6, 0.0, 0.0, 4470.0]),
+    cov=np.diag([2.5e7, 2.5e7, 4.0, 4.0]),
+    bounded=(),
+    step=30.0,
+    steps=20,
+    times=10,
+    blocks=4,
+    wrapped=True,
 )
 
 
 def measurements(workload: Workload, seed: int = 1969) -> np.ndarray:
     """Measurements (trajectories, times, m) of simulated trajectories."""
     generator = np.random.default_rng(seed)
-    x = workload.draw(generator, workload.trajectories).T
+    x = initial_states(workload, generator).T
     root = np.linalg.cholesky(workload.noise_cov)
     y = []
     for _ in range(workload.times):
@@ -86,6 +128,16 @@ def measurements(workload: Workload, seed: int = 1969) -> np.ndarray:
         h = workload.observe(np, x)
         y.append(h + root @ generator.standard_normal(h.shape))
     return np.ascontiguousarray(np.array(y).transpose(2, 0, 1))
+
+
+def initial_states(workload: Workload, generator: np.random.Generator) -> np.ndarray:
+    """True states (trajectories, n) at the start."""
+    draws = generator.standard_normal((workload.trajectories, len(workload.mean)))
+    for state in workload.bounded:
+        draws[:, state] *= BEFORE
+        while (outside := np.abs(draws[:, state]) > BOUND).any():
+            draws[outside, state] = BEFORE * generator.standard_normal(outside.sum())
+    return workload.mean + np.sqrt(np.diag(workload.cov)) * draws
 
 
 def rk4(rate: Callable[[Any], Any], x: Any, h: float) -> Any:

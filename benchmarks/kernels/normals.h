@@ -5,7 +5,7 @@
 typedef double real __attribute__((vector_size(64)));
 typedef uint64_t word __attribute__((vector_size(64)));
 
-enum { START = 1, NOISE = 2 }; /* purposes of a draw */
+enum { OF_START = 1, OF_NOISE = 2, OF_BOUNDED_START = 3 }; /* purposes of a draw */
 static const word COUNT = {0, 1, 2, 3, 4, 5, 6, 7};
 
 INLINE real all(double value) { return (real){0} + value; }
@@ -69,6 +69,27 @@ INLINE real root(real x) {
     return r;
 }
 
+/* the angle of (x, y), in [-pi, pi]: atan t = t - t^3/3 + ... for t up to tan(pi/8), 21 terms */
+INLINE real angle(real y, real x) {
+    const real X = choose((word)(x < 0.0), -x, x), Y = choose((word)(y < 0.0), -y, y);
+    const word steep = (word)(Y > X);
+    const real u = choose(steep, X, Y) / choose(steep, Y, X); /* in [0, 1] */
+    const word large = (word)(u > 0.41421356237309503);
+    const real t = choose(large, (u - 1.0) / (u + 1.0), u), z = t * t;
+    real sum = all(1.0 / 43.0);
+    for (int k = 41; k > 0; k -= 2) sum = 1.0 / k - z * sum;
+    const real low = t * sum + choose(large, all(0x1.921fb54442d18p-1), all(0.0));
+    const real half = choose(steep, 0x1.921fb54442d18p+0 - low, low);
+    const real whole = choose((word)(x < 0.0), 0x1.921fb54442d18p+1 - half, half);
+    return choose((word)(y < 0.0), -whole, whole);
+}
+
+/* less the nearest whole turn */
+INLINE real wrapped(real angle) {
+    const double shift = 0x1.8p52; /* adding it rounds to an integer */
+    return angle - 0x1.921fb54442d18p+2 * ((angle * 0x1.45f306dc9c883p-3 + shift) - shift);
+}
+
 /* two standard normals of each trajectory */
 INLINE void normals(uint64_t seed, uint64_t purpose, word trajectory, uint64_t index, real *first, real *second) {
     word a = trajectory, b = (word){0} + index;
@@ -80,16 +101,16 @@ INLINE void normals(uint64_t seed, uint64_t purpose, word trajectory, uint64_t i
     *second = radius * sine;
 }
 
-/* 2 + d, d normal cut at .84 so that its variance is .16: first of the trajectory's normals that is inside */
-INLINE real initial_state(uint64_t seed, word trajectory) {
+/* normal, of variance one once it is cut at 2.1: the first of the trajectory's normals that is inside */
+INLINE real bounded(uint64_t seed, word trajectory) {
     real x = all(0.0), pair[2];
     word open = ~(word){0};
     for (uint64_t index = 0;; index++) {
-        normals(seed, START, trajectory, index, &pair[0], &pair[1]);
+        normals(seed, OF_BOUNDED_START, trajectory, index, &pair[0], &pair[1]);
         for (int k = 0; k < 2; k++) {
-            const real d = 0.5003729518 * pair[k];
-            const word taken = open & (word)(d <= 0.84) & (word)(d >= -0.84);
-            x = choose(taken, 2.0 + d, x);
+            const real d = 1.2509323795 * pair[k];
+            const word taken = open & (word)(d <= 2.1) & (word)(d >= -2.1);
+            x = choose(taken, d, x);
             open &= ~taken;
         }
         uint64_t any = 0;
