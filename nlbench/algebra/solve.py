@@ -46,6 +46,20 @@ def inverse(matrix: Tensor) -> Tensor:
     return einsum("kl,ki,lj->ij", weights, inverted, inverted, sym="ij")
 
 
+def squared_distance(matrix: Tensor, vector: Tensor) -> Scalar:
+    """v' matrix^-1 v for a symmetric matrix with nonzero leading minors: with w = L^-1 v, the sum of w_i^2/d_i."""
+    lower, pivots = ldl(matrix)
+    solved: list[Scalar] = []
+    total: Scalar = 0.0
+    for i, pivot in enumerate(pivots):
+        rest = vector[i]
+        for k, known in enumerate(solved):
+            rest = add(rest, multiply(-1.0, multiply(lower[i, k], known)))
+        solved.append(rest)
+        total = add(total, multiply(rest, rest) / pivot)
+    return total
+
+
 def log_determinant(matrix: Tensor) -> jax.Array:
     """Logarithm of the determinant of a positive definite matrix; NaN if a pivot is negative."""
     return sum((jnp.log(pivot) for pivot in ldl(matrix)[1]), jnp.zeros(()))

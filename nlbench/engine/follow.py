@@ -55,8 +55,8 @@ def follow(runner: Runner, schedule: Schedule, measurements: Any, lanes: int) ->
         return carry, emitted(filter, carry[0])
 
     carry = (start, jnp.zeros(lanes, int))
-    (_, guarded), outputs = jax.lax.scan(to_output, carry, jnp.arange(schedule.outputs))
-    components = jnp.concatenate([emitted(filter, start)[None], outputs])
+    (end, guarded), outputs = jax.lax.scan(to_output, carry, jnp.arange(schedule.outputs))
+    components = joined(filter, schedule, start, outputs, end)
     return Followed(components, guarded, jnp.full(lanes, schedule.measurements))
 
 
@@ -68,8 +68,22 @@ def spread(state: Any, lanes: int) -> Any:
 
 
 def emitted(filter: Filter, state: Any) -> Any:
-    """The components (k, L) of a block's state."""
-    components = over_lanes(filter.components)(state)
+    """The components (k, L) of a block's state; nothing of a filter that gives them at the end."""
+    return None if filter.history else _stacked(over_lanes(filter.components)(state))
+
+
+def joined(filter: Filter, schedule: Schedule, start: Any, outputs: Any, end: Any) -> Any:
+    """The components (T, k, L) at all output times, from those emitted after the start, or from the state at the
+    end."""
+    if filter.history is None:
+        return jnp.concatenate([emitted(filter, start)[None], outputs])
+    history, steps = filter.history, schedule.output_every * schedule.segment_steps
+    times = jnp.arange(schedule.outputs + 1) * steps * schedule.step
+    return jnp.moveaxis(_stacked(over_lanes(lambda state: history(state, times))(end)), 0, 1)
+
+
+def _stacked(components: Any) -> Any:
+    """Mean, covariance and third moment in one first axis."""
     carried = [tensor for tensor in components[:3] if tensor is not None]
     return jnp.stack(
         [entry for tensor in carried for entry in tensor]

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from nlbench.algebra import Tensor, einsum, expand, inverse, positive_definite, zeros
+from nlbench.algebra import Tensor, expand, positive_definite, squared_distance, zeros
 from nlbench.algebra.scalarise import scalarise
 from nlbench.updates.posterior import through_gain
 
@@ -52,7 +52,7 @@ def _one(rules: System, model: System, x: list[Any], given: list[Any]) -> Judged
     """One trajectory at one time: n states, k components."""
     mean, cov, third = _parted(given, model.states)
     error, cov, third = _errors(model, x, mean, cov, third)
-    distance = einsum("i,i->", einsum("ij,j->i", inverse(cov), error), error)[()]
+    distance = squared_distance(cov, error)
     lost = ~reduce(jnp.logical_and, map(jnp.isfinite, error))
     if rules.diverged is not None:
         ((_, (rule,)),) = scalarise(rules.diverged, list(error), dtype=float)

@@ -13,7 +13,7 @@ from nlbench.errors import ConfigError
 from nlbench.moments.moments import Moments
 from nlbench.simulate import path
 from nlbench.statistics.layout import Layout
-from nlbench.systems.system import Coordinate, Sets, System
+from nlbench.systems.system import Coordinate, InitialPosterior, Sets, System
 
 if TYPE_CHECKING:
     from nlbench.config import Experiment, FilterSpec
@@ -66,7 +66,8 @@ def make(experiment: Experiment, own: System | None = None) -> Problem:
     times = schedule.make(end, step, output, truth.interval, sightings)
     runners = [_runner(experiment, spec, own, times) for spec in experiment.filters]
     if experiment.reference is not None:
-        runners.append(_bound(experiment.reference, experiment.reference, truth, {}, truth.initial, times))
+        known = replace(truth, exact=_roomy(truth.exact, times))
+        runners.append(_bound(experiment.reference, experiment.reference, known, {}, truth.initial, times))
     for runner in runners:
         model = runner.filter.system
         if (model.states, model.measurements) != (truth.states, truth.measurements):
@@ -89,6 +90,13 @@ def _nominal_steps(truth: System, times: Schedule) -> tuple[int, ...]:
     angles = np.unwrap(np.asarray(jax.vmap(truth.sightings.angle)(states)))
     due = [float(truth.sightings.due(number)) for number in range(times.sightings)]
     return tuple(int(step) + 1 for step in np.searchsorted(np.maximum.accumulate(angles), due))
+
+
+def _roomy(exact: Any, times: Schedule) -> Any:
+    """A reference that remembers its measurements, with room for those of the schedule."""
+    if not isinstance(exact, InitialPosterior):
+        return exact
+    return exact._replace(most=times.sightings or times.measurements)
 
 
 def _runner(experiment: Experiment, spec: FilterSpec, own: System | None, times: Schedule) -> Runner:

@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from nlbench.algebra import Tensor, expand
-from nlbench.engine.follow import Followed, emitted, over_lanes, spread
+from nlbench.engine.follow import Followed, emitted, joined, over_lanes, spread
 from nlbench.orbit import wrapped
 
 if TYPE_CHECKING:
     from nlbench.engine.problem import Problem, Runner
     from nlbench.simulate import Simulated
-    from nlbench.systems.system import Sightings
 
 
 class Progress(NamedTuple):
@@ -36,9 +34,9 @@ class Progress(NamedTuple):
 def follow_sightings(problem: Problem, runner: Runner, data: Simulated) -> Followed:
     """The filter along the truth (steps + 1, n, L) of a block, whose sightings have the noise (K, m, L)."""
     schedule, lanes, filter = problem.schedule, problem.block, runner.filter
-    seen, truth = filter.system.sightings, problem.truth.sightings
-    if seen is None or truth is None:
-        raise ValueError("a schedule with sightings needs a system that says what they are")
+    truth, seen_angle = problem.truth.sightings, filter.angle
+    if truth is None or seen_angle is None:
+        raise ValueError("a schedule with sightings needs systems that say what they are")
 
     def advanced(before: Progress) -> Progress:
         t = before.step * schedule.step
@@ -48,9 +46,9 @@ def follow_sightings(problem: Problem, runner: Runner, data: Simulated) -> Follo
             due = step >= jnp.asarray(problem.nominal_steps)[jnp.minimum(before.made, schedule.sightings - 1)]
             angle = before.angle
         else:
-            now = over_lanes(lambda state: _angle(seen, filter.components(state).mean))(state)
+            now = over_lanes(seen_angle)(state)
             angle = before.angle + wrapped(now - before.angle)
-            due = angle >= seen.due(before.made)
+            due = angle >= truth.due(before.made)
         return before._replace(
             step=step, state=state, angle=angle, due=due & (before.made < schedule.sightings)
         )
@@ -88,10 +86,4 @@ def follow_sightings(problem: Problem, runner: Runner, data: Simulated) -> Follo
     none = jnp.zeros(lanes, int)
     start = Progress(jnp.asarray(0), state, jnp.zeros(lanes), jnp.zeros(lanes, bool), made=none, guarded=none)
     end, outputs = jax.lax.scan(to_output, start, jnp.arange(schedule.outputs))
-    components = jnp.concatenate([emitted(filter, state)[None], outputs])
-    return Followed(components, end.guarded, end.made)
-
-
-def _angle(sightings: Sightings, mean: Tensor) -> Any:
-    """The central angle of the mean, an array only for it to look at."""
-    return expand(lambda t, x: jnp.stack([sightings.angle(x)]), 0.0, list(mean), 0).value[0]
+    return Followed(joined(filter, schedule, state, outputs, end.state), end.guarded, end.made)

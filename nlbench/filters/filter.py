@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
+    from nlbench.algebra import Tensor
     from nlbench.systems.system import System
 
 
@@ -36,6 +37,9 @@ class Filter(NamedTuple):
     rates: (state, t, y=None) -> Moments, their time derivatives between measurements.
     integrate: (state, t, h, count) -> state, `count` steps of h from t; what `predict` and the engine call.
     components: state -> Components, the unique components of the moments.
+    angle: state -> the central angle that sightings wait for; None without sightings.
+    history: (state, times (T,)) -> Components (T,): the moments at earlier times, for a filter that remembers all it
+        needs and computes them dearly; the engine then asks for them once, at the end. None for the others.
     """
 
     name: str
@@ -47,3 +51,16 @@ class Filter(NamedTuple):
     rates: Callable
     integrate: Callable
     components: Callable
+    angle: Callable | None = None
+    history: Callable | None = None
+
+
+def central_angle(system: System, mean: Tensor) -> Any:
+    """The central angle of a mean, by the system's sightings; no array is formed of it."""
+    import jax.numpy as jnp
+
+    from nlbench.algebra import expand
+
+    sightings = system.sightings
+    assert sightings is not None
+    return expand(lambda t, x: jnp.stack([sightings.angle(x)]), 0.0, list(mean), 0).value[0]

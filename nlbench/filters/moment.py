@@ -16,7 +16,7 @@ import jax.numpy as jnp
 
 from nlbench.algebra import Tensor, einsum, log_determinant, zeros
 from nlbench.errors import ConfigError
-from nlbench.filters.filter import Filter, UpdateInfo
+from nlbench.filters.filter import Filter, UpdateInfo, central_angle
 from nlbench.moments import integrate as integration
 from nlbench.moments.equations import fourth_moment_rate, rates
 from nlbench.moments.moments import Components, Moments, dense, to_components, to_full
@@ -70,6 +70,7 @@ def build(name: str, row: Row, system: System, options: Options) -> Filter:
         rates=state_rates,
         integrate=integrate,
         components=lambda state: state,
+        angle=(lambda state: central_angle(system, state.mean)) if system.sightings else None,
     )
 
 

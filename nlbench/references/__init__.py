@@ -13,11 +13,13 @@ if TYPE_CHECKING:
 
 def build(system: System) -> Filter:
     """The exact reference of a system. Raises `ConfigError` where it has none."""
-    from nlbench.references import initial_grid, kalman_bank
-    from nlbench.systems.system import KalmanBank
+    from nlbench.references import initial_grid, kalman_bank, remembered
+    from nlbench.systems.system import InitialPosterior, KalmanBank
 
     if system.exact is None:
         raise ConfigError("exact: this system has no exact reference")
     if isinstance(system.exact, KalmanBank):
         return kalman_bank.build(system, system.exact)
+    if isinstance(system.exact, InitialPosterior):
+        return remembered.build(system, system.exact)
     return initial_grid.build(system, system.exact)

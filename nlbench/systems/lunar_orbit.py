@@ -31,11 +31,13 @@ landmarks are sighted, a root mean square of it over the last 12,000 s above 50,
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from nlbench.systems.system import Coordinate, LateError, Sets, Sightings, System
+from nlbench.systems.system import Coordinate, InitialPosterior, LateError, Sets, Sightings, System
 
 if TYPE_CHECKING:
     from nlbench.systems.lunar_geometry import Geometry
@@ -113,6 +115,18 @@ class Parameters(BaseModel):
 
 def build(parameters: Parameters) -> System:
     """The system with the given parameters; where it is polar, `truth` is the Cartesian one that makes the data."""
+    from nlbench.systems import kepler
+
+    cartesian = _model(parameters.model_copy(update={"coordinates": "cartesian"}))
+    if parameters.coordinates == "polar":
+        return replace(_model(parameters), truth=cartesian)
+    polar = _model(parameters.model_copy(update={"coordinates": "polar", "initial_cov": "transformed"}))
+    mu = MU * parameters.time_unit**2 / parameters.length_unit**3
+    return replace(cartesian, exact=InitialPosterior(partial(kepler.flow, mu=mu), companion=polar))
+
+
+def _model(parameters: Parameters) -> System:
+    """What a filter in the coordinates of the parameters believes."""
     from nlbench.systems.lunar_geometry import Geometry, wrapped_residual
 
     case, polar = CASES[parameters.case], parameters.coordinates == "polar"
@@ -132,7 +146,6 @@ def build(parameters: Parameters) -> System:
         observe=geometry.observe_nearest,
         measurement_cov=[[parameters.measurement_variance or case.measurement_variance]],
         initial=geometry.start(parameters.initial_cov == "transformed"),
-        truth=build(parameters.model_copy(update={"coordinates": "cartesian"})) if polar else None,
         sample=_sampler(geometry, parameters.initial_error),
         residual=wrapped_residual,
         coordinates=_coordinates(parameters),

@@ -55,6 +55,22 @@ class KalmanBank(NamedTuple):
     spectrum: Any = None
 
 
+class InitialPosterior(NamedTuple):
+    """The nearly exact posterior of a system without process noise, with a normal prior: a density of the initial
+    state, by importance sampling.
+
+    flow: (t, x0) -> (n,), the motion in closed form. companion: the system whose linearised filter decides when the
+    reference makes a sighting; None means the system itself. most: how many measurements it can remember.
+    radii, turns: how many points are laid, as `nlbench.references.points` says.
+    """
+
+    flow: Function
+    companion: System | None = None
+    most: int = 64
+    radii: int = 5
+    turns: int = 2
+
+
 class Sightings(NamedTuple):
     """Measurements made at angles of a revolution, instead of at times.
 
@@ -152,7 +168,7 @@ class System:
     step: float | None = None
     interval: float | None = None
     sightings: Sightings | None = None
-    exact: InitialGrid | KalmanBank | None = None
+    exact: InitialGrid | KalmanBank | InitialPosterior | None = None
     norms: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     @property

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from nlbench.algebra import Tensor, inverse, ldl, log_determinant, positive_definite
+from nlbench.algebra import Tensor, inverse, ldl, log_determinant, positive_definite, squared_distance
 from tests.oracle import random_cov, rng
 
 SIZES = pytest.mark.parametrize("m", [1, 2, 3, 4])
@@ -56,6 +56,18 @@ def test_log_determinant_equals_numpy(m):
         np.testing.assert_allclose(
             log_determinant(symmetric(matrix)), np.linalg.slogdet(matrix)[1], rtol=1e-11
         )
+
+
+@SIZES
+@pytest.mark.parametrize("units", [1.0, 1e5])
+def test_squared_distance_equals_numpy_whatever_the_units_of_the_coordinates(m, units):
+    scale = np.diag(units ** np.arange(m))
+    for seed in range(5):
+        matrix, vector = random_cov(rng(seed), m), rng(seed + 50).normal(size=m)
+        expected = vector @ np.linalg.solve(matrix, vector)
+        given = Tensor.from_array(jnp.asarray(scale @ vector), ((0,),))
+        found = squared_distance(symmetric(scale @ matrix @ scale), given)
+        np.testing.assert_allclose(found, expected, rtol=1e-10)
 
 
 @SIZES
