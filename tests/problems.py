@@ -10,7 +10,11 @@ import numpy as np
 
 import nlbench as nb
 
-GOLDEN = json.loads((Path(__file__).parent / "golden" / "updates.json").read_text())
+GOLDEN = {
+    name: content
+    for path in sorted((Path(__file__).parent / "golden").glob("updates*.json"))
+    for name, content in json.loads(path.read_text()).items()
+}
 
 
 def golden(group):
