@@ -44,7 +44,10 @@ def source_entry(data: Data) -> dict[str, Any]:
     """Legend entry of the source's band; none when the source's number of runs is unknown."""
     from matplotlib.patches import Patch
 
-    return {f"95 % range of {data.source_runs:,} runs": Patch(**SOURCE)} if data.source_runs else {}
+    if not data.source_runs:
+        return {}
+    runs = "1 run" if data.source_runs == 1 else f"{data.source_runs:,} runs"
+    return {f"95 % range of {runs}": Patch(**SOURCE)}
 
 
 def steady(curves: list[Curve]) -> np.ndarray:
