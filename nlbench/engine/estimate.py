@@ -13,6 +13,7 @@ from nlbench.statistics.totals import Totals
 
 if TYPE_CHECKING:
     from nlbench.config import Experiment
+    from nlbench.schedule import Schedule
     from nlbench.systems.system import System
 
 CALIBRATION_BLOCKS = 16
@@ -39,7 +40,7 @@ def plan(experiment: Experiment, own: System | None = None) -> dict[str, Any]:
         "runs": runs,
         "blocks": blocks,
         "steps_per_run": problem.schedule.segments * problem.schedule.segment_steps,
-        "measurements_per_run": problem.schedule.measurements,
+        **_measurements(problem.schedule),
         "filters": list(experiment.labels),
         "threads": threads,
         "compile_seconds": compiled.seconds,
@@ -47,3 +48,10 @@ def plan(experiment: Experiment, own: System | None = None) -> dict[str, Any]:
         "memory_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
         "disk_bytes": 2 * state,
     }
+
+
+def _measurements(schedule: Schedule) -> dict[str, int]:
+    """How many are taken at fixed times; or for how many there is room, if they wait for an angle."""
+    if schedule.sightings:
+        return {"most_sightings_per_run": schedule.sightings}
+    return {"measurements_per_run": schedule.measurements}
