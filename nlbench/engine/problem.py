@@ -96,7 +96,7 @@ def _roomy(exact: Any, times: Schedule) -> Any:
     """A reference that remembers its measurements, with room for those of the schedule."""
     if not isinstance(exact, InitialPosterior):
         return exact
-    return exact._replace(most=times.sightings or times.measurements)
+    return exact._replace(most=times.sightings or times.measurements or 1)
 
 
 def _runner(experiment: Experiment, spec: FilterSpec, own: System | None, times: Schedule) -> Runner:

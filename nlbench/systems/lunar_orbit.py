@@ -117,12 +117,13 @@ def build(parameters: Parameters) -> System:
     """The system with the given parameters; where it is polar, `truth` is the Cartesian one that makes the data."""
     from nlbench.systems import kepler
 
-    cartesian = _model(parameters.model_copy(update={"coordinates": "cartesian"}))
-    if parameters.coordinates == "polar":
-        return replace(_model(parameters), truth=cartesian)
     polar = _model(parameters.model_copy(update={"coordinates": "polar", "initial_cov": "transformed"}))
     mu = MU * parameters.time_unit**2 / parameters.length_unit**3
-    return replace(cartesian, exact=InitialPosterior(partial(kepler.flow, mu=mu), companion=polar))
+    exact = InitialPosterior(partial(kepler.flow, mu=mu), companion=polar)
+    cartesian = replace(_model(parameters.model_copy(update={"coordinates": "cartesian"})), exact=exact)
+    if parameters.coordinates == "cartesian":
+        return cartesian
+    return replace(_model(parameters), truth=cartesian)
 
 
 def _model(parameters: Parameters) -> System:

@@ -141,6 +141,16 @@ def test_cartesian_and_polar_filters_see_the_same_runs(tmp_path):
     assert kept.loc["polar"].range.std() > 1000.0
 
 
+@pytest.mark.parametrize("changes", [{"coordinates": "polar"}, {"sightings": False}])
+def test_the_reference_is_there_whatever_the_filters_coordinates_and_without_sightings(tmp_path, changes):
+    results = run(tmp_path, system={"name": "lunar-orbit", **changes}, reference="exact")
+    rms = results.table("statistics").query(
+        "statistic == 'rms' and coordinate == 'position' and time == '4000.0'"
+    )
+    assert rms.set_index("filter").value["exact"] > 100.0
+    assert results.table("divergence").diverged.sum() == 0
+
+
 def test_feet_and_nondimensional_units_give_the_same_statistics(tmp_path):
     """Lengths in initial radii, times in initial radii by initial speed; third-order filter, sightings."""
     filters = [
