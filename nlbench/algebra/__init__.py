@@ -3,6 +3,7 @@
 from nlbench.algebra.addresses import compact_address, compact_indices
 from nlbench.algebra.contract import einsum, placements
 from nlbench.algebra.derivatives import Taylor, expand
+from nlbench.algebra.sharing import shared
 from nlbench.algebra.solve import inverse, ldl, log_determinant, positive_definite, squared_distance
 from nlbench.algebra.tensor import Tensor, identity, zeros
 
@@ -19,6 +20,7 @@ __all__ = [
     "log_determinant",
     "placements",
     "positive_definite",
+    "shared",
     "squared_distance",
     "zeros",
 ]

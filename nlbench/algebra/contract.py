@@ -136,10 +136,10 @@ def _collect(
 
 
 def _sum(monomials: Counter, times: float, tensors: dict[int, Tensor]) -> Scalar:
-    total: Scalar = 0.0
+    sums: dict[float, Scalar] = {}  # by known coefficient, so that each multiplies once
     for monomial, count in monomials.items():
         entries = [tensors[key].entries[index] for key, index in monomial]
         coefficient = reduce(multiply, filter(is_known, entries), times * count)
-        unknown = [entry for entry in entries if not is_known(entry)]
-        total = add(total, multiply(coefficient, reduce(multiply, unknown, 1.0)))
-    return total
+        unknown = reduce(multiply, (entry for entry in entries if not is_known(entry)), 1.0)
+        sums[coefficient] = add(sums.get(coefficient, 0.0), unknown)
+    return reduce(add, (multiply(coefficient, unknown) for coefficient, unknown in sums.items()), 0.0)

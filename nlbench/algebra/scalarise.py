@@ -61,7 +61,8 @@ ARITHMETIC: dict[str, Callable[..., Scalar]] = {
     "neg": lambda a: multiply(-1.0, a),
     "stop_gradient": lambda a: a,
 }
-CALLS = ("jaxpr", "call_jaxpr", "fun_jaxpr")
+CALLS = ("jaxpr", "call_jaxpr", "fun_jaxpr")  # parameters that hold what is called
+LOOPS = ("scan", "while", "cond")  # operations with such parameters that are no calls
 
 
 def scalarise(
@@ -124,7 +125,7 @@ class _Walk:
     def apply(self, equation: Any, operands: list[Nodes]) -> list[Nodes]:
         name, params = equation.primitive.name, equation.params
         inner = next((params[key] for key in CALLS if key in params), None)
-        if inner is not None and name not in ("scan", "while", "cond"):
+        if inner is not None and name not in LOOPS:
             return self.run(getattr(inner, "jaxpr", inner), getattr(inner, "consts", ()), operands)
         if name in ARITHMETIC:
             return [self.each(name, ARITHMETIC[name], operands)]

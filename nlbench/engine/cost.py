@@ -109,6 +109,8 @@ def _count(jaxpr: Any) -> int:
         ]
         repeats = equation.params.get("length", 1) if equation.primitive.name == "scan" else 1
         total += repeats * sum(_count(getattr(each, "jaxpr", each)) for each in inner)
+        branches = equation.params.get("branches", ())  # one of which is taken
+        total += max((_count(branch.jaxpr) for branch in branches), default=0)
         if equation.primitive.name in ARITHMETIC:
             total += int(np.prod(equation.outvars[0].aval.shape))
     return total

@@ -14,20 +14,19 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from nlbench.algebra import shared
+
 State = Any  # a pytree of arrays
 Field = Callable[[Any, State], State]  # (t, y) -> dy/dt
 
-# Numbers of components. From the first on, recomputing the early stages costs more than keeping them; above the second,
-# stages as a loop are faster to compile and to run.
-KEEP_FROM = 3
-LOOP_ABOVE = 8
+LOOP_ABOVE = 60  # components, above which stages as a loop save more of compiling than they cost in running
 
 
 class StagedRK4(diffrax.AbstractSolver):
     """The classical fourth-order Runge-Kutta method with a fixed step.
 
-    looped: run the four stages as a loop, which keeps large systems of equations fast to compile and to run; None
-        decides by the number of components.
+    looped: run the stages as a loop, which keeps large systems of equations fast to compile; None decides by the
+        number of components.
     """
 
     looped: bool | None = eqx.field(static=True, default=None)
@@ -55,38 +54,36 @@ class StagedRK4(diffrax.AbstractSolver):
     def advance(self, field: Field, t: Any, h: Any, y: State) -> State:
         """y one step of h later."""
         looped = len(jax.tree.leaves(y)) > LOOP_ABOVE if self.looped is None else self.looped
-        return (_looped_step if looped else _unrolled_step)(field, t, h, y)
+        traced_once = jax.jit(field)
+        return (_looped_step if looped else _unrolled_step)(traced_once, t, h, y)
 
 
 def _unrolled_step(field: Field, t: Any, h: Any, y: State) -> State:
-    """Stages in a row. XLA forms each component of the result by itself and recomputes most stages for each; with
-    several components it is made to keep the first two, by a loop whose single turn it cannot foresee."""
+    """Stages in a row."""
 
-    def second(k1: State) -> State:
-        return field(t + h / 2, _moved(y, h / 2, k1))
+    def step(y: State) -> State:
+        k1 = field(t, y)
+        k2 = field(t + h / 2, _moved(y, h / 2, k1))
+        k3 = field(t + h / 2, _moved(y, h / 2, k2))
+        k4 = field(t + h, _moved(y, h, k3))
+        return jax.tree.map(lambda y, a, b, c, d: y + h / 6 * (a + 2 * (b + c) + d), y, k1, k2, k3, k4)
 
-    k1 = field(t, y)
-    if len(jax.tree.leaves(y)) < KEEP_FROM:
-        k2 = second(k1)
-    else:
-        once = jnp.where(t == t, 1, 0)
-        k1, k2 = jax.lax.fori_loop(0, once, lambda _, k: (k[0], second(k[0])), (k1, k1))
-    k3 = field(t + h / 2, _moved(y, h / 2, k2))
-    k4 = field(t + h, _moved(y, h, k3))
-    return jax.tree.map(lambda y, a, b, c, d: y + h / 6 * (a + 2 * (b + c) + d), y, k1, k2, k3, k4)
+    return shared(step, t, y)
 
 
 def _looped_step(field: Field, t: Any, h: Any, y: State) -> State:
-    """Stages 2 to 4 as a loop. The sum takes in the slope of the stage before, which is at hand and so not formed
-    again for it."""
+    """Stages 2 to 4 as a loop. The sum takes in the slope of the stage before, which is at hand."""
 
     def stage(s: Any, carry: tuple[State, State]) -> tuple[State, State]:
-        k, total = carry
         ahead = h * jnp.where(s == 2, 1.0, 0.5)
-        total = _moved(total, h * jnp.where(s == 0, 1 / 6, 1 / 3), k)
-        return field(t + ahead, _moved(y, ahead, k)), total
+        weight = h * jnp.where(s == 0, 1 / 6, 1 / 3)
 
-    k, total = jax.lax.fori_loop(0, 3, stage, (field(t, y), y))
+        def next(k: State, total: State) -> tuple[State, State]:
+            return field(t + ahead, _moved(y, ahead, k)), _moved(total, weight, k)
+
+        return shared(next, t, *carry)
+
+    k, total = jax.lax.fori_loop(0, 3, stage, (shared(lambda y: field(t, y), t, y), y))
     return _moved(total, h / 6, k)
 
 

@@ -29,8 +29,25 @@ def test_configure_sets_double_precision_and_the_options_and_keeps_the_users_own
     dtype, *flags = output(program, xla_flags="--xla_cpu_prefer_vector_width=256").stdout.split()
     assert dtype == "float64"
     assert flags[0] == "--xla_cpu_prefer_vector_width=256"
-    assert len(flags) == 2
-    assert flags[1].startswith("--xla_backend_extra_options=")
+    assert len(flags) == 3
+    assert flags[1].startswith("--xla_backend_optimization_level=")
+    assert flags[2].startswith("--xla_backend_extra_options=")
+
+
+@pytest.mark.parametrize("precision", ["float64", "float32"])
+def test_elementary_functions_are_right_with_the_options(precision):
+    """Of numbers and of vectors longer than one register; XLA's own arctan is not."""
+    program = (
+        f"import nlbench; nlbench.configure(precision={precision!r}); import jax, numpy as np\n"
+        f"x = np.linspace(-20, 20, 1501).astype({precision!r})\n"
+        "for name in 'arctan sin cos tan tanh exp expm1 arcsinh cbrt square'.split():\n"
+        "    expected = getattr(np, name)(x); found = jax.jit(getattr(jax.numpy, name))(x)\n"
+        "    error = np.abs(found - expected) / np.maximum(np.abs(expected), 1)\n"
+        "    print(float(error.max() / np.finfo(x.dtype).eps))"
+    )
+    errors = [float(line) for line in output(program).stdout.split()]
+    assert len(errors) == 10
+    assert max(errors) < 100, errors
 
 
 def test_too_late_is_said_once():
