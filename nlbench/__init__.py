@@ -8,8 +8,10 @@ from typing import Any
 _HOMES = {
     "Moments": "nlbench.moments.moments",
     "System": "nlbench.systems.system",
+    "DiscreteSystem": "nlbench.systems.discrete",
     "Coordinate": "nlbench.systems.system",
     "configure": "nlbench.runtime",
+    "filter_data": "nlbench.filters.data",
     "load": "nlbench.config",
     "run": "nlbench.engine",
     "algebra": None,

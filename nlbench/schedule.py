@@ -12,6 +12,7 @@ class Schedule(NamedTuple):
     step: integration step. segment_steps: steps in a segment. segments: number of segments.
     measured_every: segments between measurements (0: none). output_every: segments between outputs.
     sightings: how many measurements can be made that wait for an angle, at the end of any segment (0: none).
+    continuous: whether measurements are continuous: every step is a segment, and has one at its start.
     """
 
     step: float
@@ -20,10 +21,11 @@ class Schedule(NamedTuple):
     measured_every: int
     output_every: int
     sightings: int = 0
+    continuous: bool = False
 
     @property
     def measurements(self) -> int:
-        """Number of measurements at fixed times; the first comes one interval after the start."""
+        """Number of measurements at fixed times; the first comes one interval after the start, or at once."""
         return self.segments // self.measured_every if self.measured_every else 0
 
     @property
@@ -39,13 +41,23 @@ class Schedule(NamedTuple):
     @property
     def measurement_times(self) -> tuple[float, ...]:
         """Times of the measurements."""
+        if self.continuous:
+            return self.segment_times[:-1]
         return self.segment_times[self.measured_every :: self.measured_every] if self.measured_every else ()
 
 
-def make(end: float, step: float, output: float, interval: float | None, sightings: int = 0) -> Schedule:
+def make(
+    end: float,
+    step: float,
+    output: float,
+    interval: float | None,
+    sightings: int = 0,
+    continuous: bool = False,
+) -> Schedule:
     """The schedule of a run; `interval` None means no measurements at fixed times.
 
-    With sightings every step is a segment, so that one can be made after each.
+    With sightings every step is a segment, so that one can be made after each; so it is with continuous measurements,
+    which have no interval.
 
     end and output are multiples of step and end one of output, as validated experiments are; an interval longer than
     the run means that none is taken.
@@ -54,6 +66,8 @@ def make(end: float, step: float, output: float, interval: float | None, sightin
     interval_steps = round(interval / step) if interval is not None else 0
     segment = 1 if sightings else math.gcd(output_steps, interval_steps)
     total = round(end / output) * output_steps
+    if continuous:
+        return Schedule(step, 1, total, 1, output_steps, continuous=True)
     if interval_steps > total:
         interval_steps, segment = 0, output_steps
     return Schedule(

@@ -79,11 +79,15 @@ def simulate(system: System, schedule: Schedule, key: Any, trajectory: Trajector
     states = jnp.concatenate([start[None], path(system, schedule, own, start)])
     own = trajectory_key(key, trajectory.high, trajectory.low, MEASUREMENT)
     count = schedule.sightings or schedule.measurements
-    noise = jax.random.normal(own, (count, system.measurements)) @ root(system.measurement_cov)
+    variance = np.asarray(system.measurement_cov, float)
+    if schedule.continuous:  # white noise of that spectral density, as a sample held over a step
+        variance = variance / schedule.step
+    noise = jax.random.normal(own, (count, system.measurements)) @ root(variance)
     if not schedule.measurements:
         return Simulated(states, noise[:0], noise)
     times = jnp.asarray(schedule.measurement_times)
-    measured = states[schedule.measured_every :: schedule.measured_every]
+    every = schedule.measured_every
+    measured = states[:-1] if schedule.continuous else states[every::every]
     h = jax.vmap(lambda t, x: _stacked(system.observe(t, x)))(times, measured)
     return Simulated(states, h + noise, noise[:0])
 

@@ -19,7 +19,7 @@ MODULES = {
 }
 # What each layer may import besides itself. A module belongs to the longest name that its own starts with.
 BASE = {"errors", "suggestions", "checks", "runtime"}
-CORE = {"algebra", "moments", "updates", "schedule", "systems.system", "filters.filter"}
+CORE = {"algebra", "moments", "updates", "schedule", "systems.system", "systems.discrete", "filters.filter"}
 ALLOWED: dict[str, set[str]] = {
     "": set(),
     "errors": set(),
@@ -32,12 +32,18 @@ ALLOWED: dict[str, set[str]] = {
     "moments": {"algebra"},
     "updates": {"algebra", "moments"},
     "systems.system": set(),
+    "systems.discrete": set(),
     "systems": {"systems.system", "moments", "orbit", "errors", "checks"},
     "simulate": {"systems.system", "schedule", "algebra", "moments"},
-    "filters.filter": set(),
-    "filters.catalogue": set(),
+    "filters.filter": {"algebra"},
+    "row": set(),
+    "continuous.catalogue": {"row"},
+    "discrete.catalogue": {"row"},
+    "discrete": {"errors", *CORE},
+    "filters.catalogue": {"row", "continuous.catalogue", "discrete.catalogue"},
     "references": {"errors", *CORE},
-    "filters": {"filters.catalogue", "references", *BASE, *CORE},
+    "continuous": {"row", "continuous.catalogue", "errors", *CORE},
+    "filters": {"row", "filters.catalogue", "continuous", "discrete", "references", *BASE, *CORE},
     "config": {"systems", "filters.catalogue", "errors", "suggestions"},
     "statistics": set(),
     "results": {"config", "errors"},

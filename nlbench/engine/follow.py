@@ -31,6 +31,8 @@ def follow(runner: Runner, schedule: Schedule, measurements: Any, lanes: int) ->
     def segment(number: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
         state, guarded = carry
         t = number * span
+        if schedule.continuous:
+            return held(number, carry)
         state = over_lanes(lambda state: filter.integrate(state, t, runner.step, runner.steps))(state)
         if schedule.measured_every == 0:
             return state, guarded
@@ -44,6 +46,15 @@ def follow(runner: Runner, schedule: Schedule, measurements: Any, lanes: int) ->
         y = measurements[(number + 1) // schedule.measured_every - 1]
         t = (number + 1) * span
         state, info = over_lanes(lambda state, y: filter.update(state, t, y))(state, y)
+        return state, guarded + info.guarded
+
+    def held(number: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
+        """A step under the measurement at its start: a filter's update is the step, a reference must still move."""
+        state, guarded = carry
+        t = number * span
+        state, info = over_lanes(lambda state, y: filter.update(state, t, y))(state, measurements[number])
+        if filter.system.measurement == "discrete":
+            state = over_lanes(lambda state: filter.integrate(state, t, runner.step, runner.steps))(state)
         return state, guarded + info.guarded
 
     def to_output(carry: tuple[Any, Any], output: Any) -> tuple[tuple[Any, Any], Any]:

@@ -63,13 +63,18 @@ def make(experiment: Experiment, own: System | None = None) -> Problem:
     truth = stated.truth or stated
     end, step, output = experiment.time.end, experiment.time.step, experiment.time.output
     sightings = truth.sightings.most(end) if truth.sightings else 0
-    times = schedule.make(end, step, output, truth.interval, sightings)
+    continuous = truth.measurement == "continuous"
+    times = schedule.make(end, step, output, truth.interval, sightings, continuous)
     runners = [_runner(experiment, spec, own, times) for spec in experiment.filters]
     if experiment.reference is not None:
-        known = replace(truth, exact=_roomy(truth.exact, times))
+        known = replace(_sampled(truth, times), exact=_roomy(truth.exact, times))
         runners.append(_bound(experiment.reference, experiment.reference, known, {}, truth.initial, times))
     for runner in runners:
         model = runner.filter.system
+        if runner.label != experiment.reference and model.measurement != truth.measurement:
+            raise ConfigError(
+                f"{runner.label}: its measurements are {model.measurement}, and those of the data {truth.measurement}"
+            )
         if (model.states, model.measurements) != (truth.states, truth.measurements):
             raise ConfigError(
                 f"{runner.label}: its model has {model.states} states and {model.measurements} measurements, "
@@ -99,11 +104,37 @@ def _roomy(exact: Any, times: Schedule) -> Any:
     return exact._replace(most=times.sightings or times.measurements or 1)
 
 
+def _sampled(truth: System, times: Schedule) -> System:
+    """The truth as a reference sees it: continuous measurements are samples, one at the start of each step."""
+    if not times.continuous:
+        return truth
+    variance = np.asarray(truth.measurement_cov, float) / times.step
+    return replace(truth, measurement="discrete", measurement_cov=variance)
+
+
 def _runner(experiment: Experiment, spec: FilterSpec, own: System | None, times: Schedule) -> Runner:
     system = own or systems.build(experiment.system.name, **{**experiment.system.parameters, **spec.model})
     initial = _overridden(system.initial, {**experiment.initial, **spec.initial})
     options = {**spec.options, "missing": False}
+    if system.measurement == "continuous":
+        options = {**_stated(spec), "missing": False, "step": _only_step(spec, times)}
     return _bound(spec.label, spec.name, system, options, initial, times)
+
+
+def _stated(spec: FilterSpec) -> dict[str, Any]:
+    """The options that differ from their defaults, which may be others where measurements are continuous."""
+    defaults = filters.options(spec.name)().model_dump(mode="json")
+    return {name: value for name, value in spec.options.items() if value != defaults[name]}
+
+
+def _only_step(spec: FilterSpec, times: Schedule) -> float:
+    """The step of the run, at each of which there is a measurement. Raises `ConfigError` for another."""
+    if spec.options.get("step") not in (None, times.step):
+        raise ConfigError(
+            f"{spec.label}.step: got {spec.options['step']:g}; a continuous measurement is made at each step of the "
+            f"run and a filter's steps are the same, time.step = {times.step:g}"
+        )
+    return times.step
 
 
 def _bound(label: str, name: str, system: System, options: dict, initial: Moments, times: Schedule) -> Runner:

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
+from pydantic import BaseModel, Field, PositiveFloat, PositiveInt
+
+from nlbench.continuous.catalogue import ROWS as CONTINUOUS
+from nlbench.continuous.catalogue import SHARED as ALSO_CONTINUOUS
+from nlbench.discrete.catalogue import ROWS as DISCRETE
+from nlbench.row import Row, StrictOptions
 
 
-class Integrator(BaseModel):
+class Integrator(StrictOptions):
     """An integrator of the moment equations: a solver of diffrax by name, with tolerances (None: fixed steps)."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     solver: str = Field(default="rk4", description="rk4, or the name of a diffrax solver such as Tsit5")
     rtol: PositiveFloat | None = Field(default=None, description="relative tolerance of an adaptive solver")
     atol: PositiveFloat | None = Field(default=None, description="absolute tolerance of an adaptive solver")
 
 
-class Options(BaseModel):
+class Options(StrictOptions):
     """Options of a moment filter."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     equations: Literal["corrected", "printed"] = Field(
         default="corrected", description="the corrected equations, or those that the source printed"
@@ -39,42 +40,63 @@ class Options(BaseModel):
     missing: bool = Field(default=True, description="whether measurements may be NaN, meaning not taken")
 
 
+class CurvedOptions(Options):
+    """Options of an update that looks beyond the linearised measurement: a limiter then clips every use."""
+
+    limiter_scope: Literal["all"] = "all"
+
+
+class TemperingOptions(CurvedOptions):
+    """Options of the integration update."""
+
+    steps: PositiveInt = Field(default=5, description="RK4 steps in pseudo-time")
+    measurement: Literal["linear", "quadratic"] = Field(
+        default="linear", description="expand the measurement to first or to second order"
+    )
+
+
+class TwoStepOptions(CurvedOptions):
+    """Options of the two-step updates."""
+
+    steps: PositiveInt = Field(default=10, description="RK4 steps in pseudo-time")
+
+
+class DirectOptions(CurvedOptions):
+    """Options of direct numerical integration."""
+
+    points: int = Field(default=51, ge=3, description="points per dimension, over 17 prior sigmas")
+
+
+class QuadratureOptions(CurvedOptions):
+    """Options of Gauss-Hermite quadrature."""
+
+    points: int = Field(default=9, ge=3, description="nodes per dimension")
+
+
 class GuardedOptions(Options):
     """Options of a filter whose safeguard is the guard."""
 
     guard: Literal["none", "sub1"] = "sub1"
 
 
-class ExactOptions(BaseModel):
-    """Options of the exact reference."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Row(NamedTuple):
-    """One named filter. `order` is that of its moment equations; `update` names a function of `nlbench.updates`."""
-
-    says: str
-    source: str
-    order: int
-    update: str
-    options: type[BaseModel] = Options
-
-
 CULVER = "Culver 1969"
-FILTERS = {
+MOMENT = {
     "linearised-kalman": Row(
-        "Kalman filter linearised at its own estimate", f"{CULVER}, 4.71-4.72", 1, "kalman"
+        "Kalman filter linearised at its own estimate", f"{CULVER}, 4.71-4.72", 1, "kalman", Options
     ),
-    "ekf": Row("another name of linearised-kalman", f"{CULVER}, 4.71-4.72", 1, "kalman"),
-    "second-order": Row("second-order moment equations, Kalman update", f"{CULVER}, 5.66", 2, "kalman"),
+    "ekf": Row("another name of linearised-kalman", f"{CULVER}, 4.71-4.72", 1, "kalman", Options),
+    "second-order": Row(
+        "second-order moment equations, Kalman update", f"{CULVER}, 5.66", 2, "kalman", Options
+    ),
     "third-order": Row(
-        "third-order moment equations, optimal Hermite update", f"{CULVER}, table 5.1", 3, "hermite3"
+        "third-order moment equations, optimal Hermite update", f"{CULVER}, table 5.1", 3, "hermite3", Options
     ),
     "third-order-sub1": Row(
-        "third order, Kalman mean and covariance at updates", f"{CULVER}, 5.67", 3, "sub1"
+        "third order, Kalman mean and covariance at updates", f"{CULVER}, 5.67", 3, "sub1", Options
     ),
-    "third-order-sub2": Row("third order, Kalman covariance at updates", f"{CULVER}, 5.68", 3, "sub2"),
+    "third-order-sub2": Row(
+        "third order, Kalman covariance at updates", f"{CULVER}, 5.68", 3, "sub2", Options
+    ),
     "third-order-guarded": Row(
         "third order that falls back to sub1 where positiveness is lost",
         f"{CULVER}, table 5.1 and 5.67",
@@ -87,9 +109,14 @@ FILTERS = {
         f"{CULVER}, figure 7.24",
         4,
         "hermite3",
+        Options,
     ),
     "fourth-order": Row(
-        "fourth-order moment equations, exact Hermite update", f"{CULVER}, 5.5 corrected", 4, "hermite4"
+        "fourth-order moment equations, exact Hermite update",
+        f"{CULVER}, 5.5 corrected",
+        4,
+        "hermite4",
+        Options,
     ),
     "fourth-order-guarded": Row(
         "fourth order that falls back to sub1 where positiveness is lost",
@@ -98,10 +125,81 @@ FILTERS = {
         "hermite4",
         GuardedOptions,
     ),
-    "exact": Row(
-        "the exact posterior, where the system has one", "Bayes's rule on a grid", 0, "bayes", ExactOptions
+    "series-3": Row(
+        "series expansion of the update, third order", f"{CULVER}, F.37-F.40", 3, "series", CurvedOptions
+    ),
+    "series-4": Row(
+        "series expansion of the update, fourth order", f"{CULVER}, F.37-F.41", 4, "series", CurvedOptions
+    ),
+    "integration-update": Row(
+        "third order, the update integrated in pseudo-time",
+        f"{CULVER}, G.21",
+        3,
+        "tempering",
+        TemperingOptions,
+    ),
+    "two-step-2": Row(
+        "second order, Kalman update bent to a quadratic measurement",
+        f"{CULVER}, 5.83-5.84",
+        2,
+        "two-step",
+        TwoStepOptions,
+    ),
+    "two-step-3": Row(
+        "third order, Hermite update bent to a quadratic measurement",
+        f"{CULVER}, 5.83-5.85",
+        3,
+        "two-step",
+        TwoStepOptions,
+    ),
+    "direct-2": Row(
+        "Bayes's rule for a Gaussian prior, integrated over even steps",
+        f"{CULVER}, 5.6",
+        2,
+        "direct",
+        DirectOptions,
+    ),
+    "direct-3": Row(
+        "Bayes's rule for a third-order prior, integrated over even steps",
+        f"{CULVER}, 5.6",
+        3,
+        "direct",
+        DirectOptions,
+    ),
+    "quadrature-2": Row(
+        "Bayes's rule for a Gaussian prior, by Gauss-Hermite nodes at the mode",
+        "Bayes's rule by quadrature",
+        2,
+        "quadrature",
+        QuadratureOptions,
+    ),
+    "quadrature-3": Row(
+        "Bayes's rule for a third-order prior, by Gauss-Hermite nodes at the mode",
+        "Bayes's rule by quadrature",
+        3,
+        "quadrature",
+        QuadratureOptions,
     ),
 }
+EXACT = Row(
+    "the exact posterior, where the system has one",
+    "Bayes's rule on a grid",
+    0,
+    "bayes",
+    StrictOptions,
+    "reference",
+)
+FILTERS = {**DISCRETE, **CONTINUOUS, **MOMENT, "exact": EXACT}
+
+
+def row(name: str, discrete: bool = False, continuous: bool = False) -> Row:
+    """The row of that name; of several filters of one name, such as `ekf`, the one for the system's kind.
+
+    discrete: whether its time is discrete. continuous: whether its measurements are continuous.
+    """
+    if continuous and name in ALSO_CONTINUOUS:
+        return ALSO_CONTINUOUS[name]
+    return DISCRETE[name] if discrete and name in DISCRETE else FILTERS[name]
 
 
 def available() -> tuple[str, ...]:

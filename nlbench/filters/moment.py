@@ -1,5 +1,6 @@
 """Moment filters: moment equations of some order between measurements, an update at them, a limiter and a guard.
 
+An update is either one of `UPDATES`, which sees the linearised measurement, or one of `CURVED`, which looks beyond it.
 Between measurements the moments follow `nlbench.moments.equations` (Culver 1969, (4.64)-(4.68)); at a measurement an
 update of `nlbench.updates` turns prior into posterior. The state is the moments' unique components. Cost per step
 O(n^(order + 1)), per update O(n^(order + 1)).
@@ -10,25 +11,34 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 
-from nlbench.algebra import Tensor, einsum, log_determinant, zeros
+from nlbench.algebra import Tensor, shared, zeros
 from nlbench.errors import ConfigError
 from nlbench.filters.filter import Filter, UpdateInfo, central_angle
 from nlbench.moments import integrate as integration
 from nlbench.moments.equations import fourth_moment_rate, rates
 from nlbench.moments.moments import Components, Moments, dense, to_components, to_full
+from nlbench.updates.density import gaussian_log_density
 from nlbench.updates.guard import fallback, guarded
 from nlbench.updates.hermite3 import hermite3, sub1, sub2
 from nlbench.updates.hermite4 import hermite4
 from nlbench.updates.kalman import kalman
 from nlbench.updates.limiter import limited
 from nlbench.updates.measurement import gain, linearise
+from nlbench.updates.nonlinear import Outcome, Seen, see
+from nlbench.updates.posterior import Posterior
+from nlbench.updates.quadrature import direct, quadrature
+from nlbench.updates.series import series
+from nlbench.updates.tempering import tempering
+from nlbench.updates.two_step import two_step
 
 if TYPE_CHECKING:
-    from nlbench.filters.catalogue import Options, Row
+    from nlbench.filters.catalogue import Options
+    from nlbench.row import Row
     from nlbench.systems.system import System
 
 UPDATES: dict[str, Callable] = {
@@ -37,6 +47,18 @@ UPDATES: dict[str, Callable] = {
     "sub1": sub1,
     "sub2": sub2,
     "hermite4": hermite4,
+}
+
+
+# What makes an update of a filter's options: the updates are functions (prior, seen) -> Outcome.
+CURVED: dict[str, Callable[[Any], Callable[[Components, Seen], Outcome]]] = {
+    "series": lambda options: partial(series, equations=options.equations),
+    "tempering": lambda options: partial(
+        tempering, steps=options.steps, measurement=options.measurement, equations=options.equations
+    ),
+    "two-step": lambda options: partial(two_step, steps=options.steps, equations=options.equations),
+    "direct": lambda options: partial(direct, points=options.points),
+    "quadrature": lambda options: partial(quadrature, points=options.points),
 }
 
 
@@ -65,7 +87,7 @@ def build(name: str, row: Row, system: System, options: Options) -> Filter:
         system=system,
         init=lambda moments, key=None: to_components(moments, row.order),
         predict=predict,
-        update=partial(_update, system, row, options),
+        update=partial(_curved_update if row.update in CURVED else _update, system, row, options),
         moments=to_full,
         rates=state_rates,
         integrate=integrate,
@@ -97,6 +119,32 @@ def _update(
     sighting: Any = None,
 ) -> tuple[Components, UpdateInfo]:
     system = system if sighting is None else system.sighted(sighting)
+    made = shared(partial(_updated, system, row, options, t), t, state, y, reused=True)
+    # Where the guard fires the predictive density is Gaussian.
+    density_ratio = jnp.where(made.fired, 0.0, made.nu)
+    info = UpdateInfo(
+        innovation=made.z.to_array(),
+        innovation_cov=made.S_z.to_array(),
+        log_likelihood=gaussian_log_density(made.z, made.W, made.S_z, made.taken) + jnp.log1p(density_ratio),
+        nu=jnp.asarray(made.nu, float),
+        guarded=made.fired,
+    )
+    return made.moments, info
+
+
+class Updated(NamedTuple):
+    """Posterior moments, whether the guard fired, and what the likelihood is made of."""
+
+    moments: Components
+    fired: Any
+    nu: Any
+    z: Tensor
+    S_z: Tensor
+    W: Tensor
+    taken: Any
+
+
+def _updated(system: System, row: Row, options: Options, t: Any, state: Components, y: Any) -> Updated:
     measurement = linearise(system, t, state, y, options.missing)
     gained = gain(state.cov, measurement)
     z = clipped = measurement.z
@@ -110,18 +158,47 @@ def _update(
         moments, fired = guarded(posterior, fallback(prior, gained, z))
     if row.order == 4 and moments.fourth is None:
         moments = moments._replace(fourth=zeros(system.states, 4))
+    return Updated(
+        dense(moments), fired, posterior.nu, measurement.z, gained.S_z, gained.W, measurement.taken
+    )
+
+
+def _curved_update(
+    system: System,
+    row: Row,
+    options: Options,
+    state: Components,
+    t: Any,
+    y: Any,
+    key: Any = None,
+    sighting: Any = None,
+) -> tuple[Components, UpdateInfo]:
+    system = system if sighting is None else system.sighted(sighting)
+    measurement = linearise(system, t, state, y, options.missing)
+    gained = gain(state.cov, measurement)
+    clipped = None if options.limiter is None else limited(measurement.z, gained.S_z, options.limiter)
+    seen = see(system, t, state, y, measurement, gained, clipped)
+    moments, nu, log_likelihood = CURVED[row.update](options)(state, seen)
+    fired = jnp.zeros((), bool)
+    if options.guard == "sub1":
+        safe = (
+            kalman(state, gained, seen.z, seen.z).moments
+            if row.order == 2
+            else fallback(state, gained, seen.z)
+        )
+        moments, fired = guarded(Posterior(moments, nu), safe)
+        gaussian = gaussian_log_density(seen.z, gained.W, gained.S_z, seen.taken)
+        log_likelihood = jnp.where(fired, gaussian, log_likelihood)
+    moments = dense(moments)
+    if options.missing:  # nothing taken: the prior, to the last bit
+        some = seen.taken > 0
+        moments = jax.tree.map(lambda new, old: jnp.where(some, new, old), moments, state)
+        log_likelihood = jnp.where(some, log_likelihood, 0.0)
     info = UpdateInfo(
         innovation=measurement.z.to_array(),
         innovation_cov=gained.S_z.to_array(),
-        log_likelihood=_log_density(measurement.z, gained.W, gained.S_z, measurement.taken)
-        + jnp.log1p(jnp.where(fired, 0.0, posterior.nu)),  # where the guard fires the density is Gaussian
-        nu=jnp.asarray(posterior.nu, float),
+        log_likelihood=log_likelihood,
+        nu=jnp.asarray(nu, float),
         guarded=fired,
     )
-    return dense(moments), info
-
-
-def _log_density(z: Tensor, W: Tensor, S_z: Tensor, entries: Any) -> Any:
-    """Logarithm of the normal density N(z; 0, S_z); entries not taken have z = 0 and unit variance."""
-    distance = einsum("r,r->", einsum("rs,s->r", W, z), z)[()]
-    return -0.5 * (distance + log_determinant(S_z) + entries * math.log(2 * math.pi))
+    return moments, info

@@ -15,6 +15,7 @@ MODULES = {
     "culver-scalar": "nlbench.systems.culver_scalar",
     "oscillator": "nlbench.systems.oscillator",
     "lunar-orbit": "nlbench.systems.lunar_orbit",
+    "schwartz": "nlbench.systems.schwartz",
     OWN: "nlbench.systems.own",
 }
 

@@ -2,6 +2,7 @@
 
   dx/dt = -2 x + .7 x^2,   x(0) ~ N(2, .16),   0 to 2 s                                    (7.1), printed
   y = x + v (7.3), or y = 3 x - .5 x^2 + v (7.10),   v ~ N(0, R)                            printed
+  or continuously y = x + v (7.2), v white noise of spectral density .16, in steps of .001 to .004 s   printed
 It is in the benchmark because every closed form is known: x(t) = x0 E/(1 - .35 x0 (1 - E)) with E = exp(-2 t), so the
 exact posterior is a sum over a grid of initial conditions.
 
@@ -53,9 +54,15 @@ class Parameters(BaseModel):
     set_size: int = Field(default=80, ge=2, le=1000, description="runs in a set, for thesis-sets")
     dynamics: Literal["nonlinear", "linear"] = "nonlinear"
     decay: float = Field(default=2.0, ge=0.0, description="rate of the linear dynamics, 1/s")
-    measurement: Literal["none", "linear", "quadratic"] = "linear"
-    interval: float = Field(default=0.1, gt=0.0, description="time between measurements, s")
-    measurement_variance: float = Field(default=1.6, gt=0.0, description="variance of the measurement noise")
+    measurement: Literal["none", "linear", "quadratic", "continuous"] = "linear"
+    interval: float = Field(
+        default=0.1, gt=0.0, description="time between measurements, s, where they are not continuous"
+    )
+    measurement_variance: float = Field(
+        default=1.6,
+        gt=0.0,
+        description="variance of the measurement noise; its spectral density where measurements are continuous",
+    )
     initial_error: InitialError | None = Field(
         default=None, description="a fixed initial error instead of draws"
     )
@@ -64,17 +71,19 @@ class Parameters(BaseModel):
 def build(parameters: Parameters) -> System:
     """The system with the given parameters."""
     linear = parameters.dynamics == "linear"
+    continuous = parameters.measurement == "continuous"
     return System(
         drift=partial(_linear_drift, parameters.decay) if linear else _drift,
         observe=_quadratic if parameters.measurement == "quadratic" else _identity,
         measurement_cov=[[parameters.measurement_variance]],
+        measurement="continuous" if continuous else "discrete",
         initial=Moments(mean=[MEAN], cov=[[VARIANCE]]),
         sample=_sampler(parameters),
         coordinates=(Coordinate("x"),),
         diverged=_diverged,
         clip=(1.0,),
-        interval=None if parameters.measurement == "none" else parameters.interval,
-        step=0.02,
+        interval=None if continuous or parameters.measurement == "none" else parameters.interval,
+        step=0.001 if continuous else 0.02,
         exact=_grid(parameters),
     )
 

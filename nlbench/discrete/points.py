@@ -1,0 +1,76 @@
+"""Points and weights that integrate over a standard normal vector: unscented, cubature, Gauss-Hermite.
+
+With points xi_i (p, d), weights w_i for means and c_i for covariances,
+  E g(xi) ~ sum w_i g(xi_i),   cov(g, h) ~ sum c_i (g_i - E g)(h_i - E h)'
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from nlbench.errors import ConfigError
+
+MOST = 100_000  # points of a product rule
+
+
+class Points(NamedTuple):
+    """at: (p, d). mean, cov: (p,), weights of means and of covariances."""
+
+    at: np.ndarray
+    mean: np.ndarray
+    cov: np.ndarray
+
+
+def unscented(d: int, alpha: float, beta: float, kappa: float | None) -> Points:
+    """The scaled unscented rule of 2 d + 1 points (Julier and Uhlmann 1997; van der Merwe 2004, 3.2).
+
+    lambda = alpha^2 (d + kappa) - d; points 0 and +-sqrt(d + lambda) on each axis; kappa None is 3 - d for d <= 3,
+    which integrates fourth powers on an axis, and else 0, which keeps the central weight from being negative.
+    """
+    kappa = float(max(3 - d, 0)) if kappa is None else kappa
+    scale = alpha**2 * (d + kappa)
+    if scale <= 0:
+        raise ConfigError(f"ukf.kappa: {kappa} must be above -{d}, minus the number of dimensions")
+    axes = np.sqrt(scale) * np.eye(d)
+    centre = (scale - d) / scale
+    mean = np.concatenate([[centre], np.full(2 * d, 0.5 / scale)])
+    cov = mean.copy()
+    cov[0] += 1 - alpha**2 + beta
+    return Points(np.concatenate([np.zeros((1, d)), axes, -axes]), mean, cov)
+
+
+def cubature(d: int) -> Points:
+    """The spherical-radial rule of third degree: 2 d points +-sqrt(d) on the axes (Arasaratnam and Haykin 2009)."""
+    axes = np.sqrt(d) * np.eye(d)
+    weights = np.full(2 * d, 0.5 / d)
+    return Points(np.concatenate([axes, -axes]), weights, weights)
+
+
+def gauss_hermite(d: int, count: int) -> Points:
+    """The product rule of count^d points, exact for polynomials of degree 2 count - 1 in each variable."""
+    if count**d > MOST:
+        raise ConfigError(f"points: {count}^{d} = {count**d} points; a product rule takes at most {MOST}")
+    x, w = np.polynomial.hermite_e.hermegauss(count)
+    weights = np.array([np.prod(each) for each in product(w / w.sum(), repeat=d)])
+    return Points(np.array(list(product(x, repeat=d))), weights, weights)
+
+
+def square_root(P: Any) -> Any:
+    """The lower triangular L with L L' = P, (n, n), column by column; P may be singular.
+
+    A pivot that rounding leaves within n eps of zero makes a column of zeros, a negative one NaN.
+    """
+    n = len(P)
+    L: list[list[Any]] = [[0.0] * n for _ in range(n)]
+    for j in range(n):
+        pivot = P[j, j] - sum(L[j][k] ** 2 for k in range(j))
+        nil = jnp.abs(pivot) <= n * jnp.finfo(P.dtype).eps * jnp.abs(P[j, j])
+        L[j][j] = jnp.where(nil, 0.0, jnp.sqrt(jnp.where(nil, 1.0, pivot)))
+        for i in range(j + 1, n):
+            rest = P[i, j] - sum(L[i][k] * L[j][k] for k in range(j))
+            L[i][j] = jnp.where(nil, 0.0, rest / jnp.where(nil, 1.0, L[j][j]))
+    return jnp.stack([jnp.stack([jnp.asarray(entry, P.dtype) for entry in row]) for row in L])

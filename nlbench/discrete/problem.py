@@ -1,0 +1,107 @@
+"""A system as the filters of this package see it: x+ = f(k, x, w) and y = h(t, x, v), and how the noise enters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from nlbench.algebra import expand
+from nlbench.systems.discrete import DiscreteSystem
+
+if TYPE_CHECKING:
+    from nlbench.systems.system import System
+
+
+class Noisy(NamedTuple):
+    """A function with noise, (t, x, w) -> array; the covariance of w; and whether w enters linearly, as a + G(x) w."""
+
+    function: Callable
+    cov: Any
+    linear: bool
+
+
+class Observation(NamedTuple):
+    """What an update needs to know: y = h(t, x, v) with v of covariance `cov`; `linear` as in `Noisy`.
+
+    innovation: (y, h) -> y - h, or what the system puts in its place. missing: whether entries of y may be NaN.
+    limiter: number of standard deviations at which residuals are clipped, or None.
+    """
+
+    function: Callable
+    cov: Any
+    linear: bool
+    innovation: Callable
+    missing: bool
+    limiter: float | None
+
+
+def observation(system: System | DiscreteSystem, options: Any) -> Observation:
+    """y = h(t, x, v); for a system in continuous time h(t, x) + v."""
+    R = jnp.asarray(system.measurement_cov, float)
+    if isinstance(system, DiscreteSystem):
+        observe = system.observe
+        function = lambda k, x, v: stacked(observe(k, x, v))  # noqa: E731
+        linear = enters_linearly(function, system.states, len(R))
+    else:
+        function = lambda t, x, v: stacked(system.observe(t, x)) + v  # noqa: E731
+        linear = True
+    limiter = getattr(options, "limiter", None)
+    return Observation(function, R, linear, system.innovation, options.missing, limiter)
+
+
+def transition(system: DiscreteSystem) -> Noisy:
+    """x+ = f(k, x, w)."""
+    function = lambda k, x, w: stacked(system.transition_with_inputs(k, x, w))  # noqa: E731
+    linear = enters_linearly(function, system.states, system.noises)
+    return Noisy(function, jnp.asarray(system.process_cov, float), linear)
+
+
+def spectrum(system: System, t: Any, x: Any) -> Any:
+    """G V G' of a system in continuous time: (n, n), zero without process noise."""
+    n = system.states
+    return jnp.zeros((n, n)) if system.diffusion is None else system.diffusion_spectrum(t, x)
+
+
+def enters_linearly(function: Callable, n: int, s: int) -> bool:
+    """Whether the second derivatives in w of function(t, x, w) are zero by structure, for x (n,) and w (s,)."""
+    return all(min(index[1:]) < n for index in curvatures(function, n, s))
+
+
+def bends(system: System | DiscreteSystem, options: Any) -> str | None:
+    """The name of a function of the system whose second derivatives are not zero by structure; None if it is linear.
+
+    Sums and products with constant matrices are zero by structure; what a branch hides may not be.
+    """
+    n = system.states
+    seen = observation(system, options)
+    functions = {"observe": (seen.function, len(seen.cov))}
+    if isinstance(system, DiscreteSystem):
+        functions["transition"] = (transition(system).function, system.noises)
+    else:
+        functions["drift"] = (lambda t, x, w: stacked(system.drift_with_inputs(t, x)), 0)
+        if system.diffusion is not None:
+            diffusion = system.diffusion
+            s = jax.eval_shape(diffusion, 0.0, jnp.zeros(n)).shape[1]
+            functions["diffusion"] = (lambda t, x, w: jnp.asarray(diffusion(t, x)) @ w, s)
+    return next((name for name, (f, s) in functions.items() if curvatures(f, n, s)), None)
+
+
+def curvatures(function: Callable, n: int, s: int) -> list[tuple[int, ...]]:
+    """Indices (i, a, b) of the second derivatives of function(t, x, w) in (x, w) that are not zero by structure."""
+    found: list[tuple[int, ...]] = []
+
+    def second(z: Any) -> None:
+        taylor = expand(lambda t, z: function(t, z[:n], z[n:]), 0.0, [z[i] for i in range(n + s)], 2)
+        assert taylor.second is not None
+        found.extend(taylor.second.entries)
+
+    jax.eval_shape(second, jnp.zeros(n + s))
+    return found
+
+
+def stacked(y: Any) -> Any:
+    """An array, also where a system returned a tuple of scalars."""
+    return jnp.stack([jnp.asarray(part) for part in y]) if isinstance(y, (tuple, list)) else jnp.asarray(y)

@@ -1,0 +1,94 @@
+"""Statistical linearisation: f and h replaced by the straight lines that fit them best under the Gaussian prior.
+
+With P = L L', x = m + L xi, and for f(x, w), w = B omega, xi and omega standard normal, the line of least mean square
+error is E f + E[f xi'] xi + E[f omega'] omega, and (Gelb 1974, 6.2)
+  (1) m- = E f,   P- = E[f xi'] E[f xi']' + E[f omega'] E[f omega']'
+  (2) z = y - E h,  S = E[h xi'] E[h xi']' + E[h nu'] E[h nu']',  cov(x, y) = L E[h xi']',   v = T nu
+What the line leaves of f and h adds nothing to the covariances; that is where `ghkf` differs. Where noise enters
+linearly, E[f omega'] = E[G(x)] B without points for w. In continuous time
+  (3) dm = E f,  dP = N P + P N' + E[G] V E[G]',  N P = E[f xi'] L'
+Expectations are Gauss-Hermite sums. State: mean and covariance. Cost: points^n x (evaluation + n^2).
+Fails when P loses positiveness (NaN), and when what the line leaves is not small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
+
+from nlbench.discrete import gaussian
+from nlbench.discrete.correction import Gaussian, correct, predicted
+from nlbench.discrete.points import gauss_hermite, square_root
+from nlbench.discrete.problem import Noisy, Observation, stacked
+
+if TYPE_CHECKING:
+    from nlbench.filters.filter import Filter, UpdateInfo
+    from nlbench.row import Row
+    from nlbench.systems.discrete import DiscreteSystem
+    from nlbench.systems.system import System
+
+
+def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) -> Filter:
+    """The filter with `options.points` nodes per dimension."""
+    count = options.points
+    return gaussian.build(
+        name, system, options, partial(_step, count), partial(_slope, count), partial(_update, count)
+    )
+
+
+def _line(
+    count: int, noise: Noisy | Observation, t: Any, prior: Gaussian, values: Callable
+) -> tuple[Any, Any, Any]:
+    """E f, E[f xi'] and E[f omega'] of f = values(x, w), where `noise` says how w enters."""
+    n, s = len(prior.mean), len(noise.cov)
+    rule = gauss_hermite(n if noise.linear else n + s, count)
+    xi, omega = rule.at[:, :n], rule.at[:, n:]
+    x = prior.mean + xi @ square_root(prior.cov).T
+    B = square_root(noise.cov)
+    if noise.linear:
+        w = jnp.zeros((len(x), s))
+        G = jax.vmap(lambda x: jax.jacfwd(noise.function, 2)(t, x, jnp.zeros(s)))(x)
+        through_noise = jnp.tensordot(rule.mean, G, 1) @ B
+        f = jax.vmap(values)(x, w)
+    else:
+        f = jax.vmap(values)(x, omega @ B.T)
+        through_noise = (rule.mean[:, None] * f).T @ omega
+    return rule.mean @ f, (rule.mean[:, None] * f).T @ xi, through_noise
+
+
+def _step(count: int, motion: Noisy, k: Any, prior: Gaussian) -> Gaussian:
+    """(1)."""
+    f, A, L = _line(count, motion, k, prior, lambda x, w: motion.function(k, x, w))
+    return Gaussian(f, A @ A.T + L @ L.T)
+
+
+def _slope(count: int, system: System, t: Any, prior: Gaussian) -> Gaussian:
+    """(3)."""
+    rule, root = gauss_hermite(len(prior.mean), count), square_root(prior.cov)
+    x = prior.mean + rule.at @ root.T
+    f = jax.vmap(lambda x: stacked(system.drift_with_inputs(t, x)))(x)
+    NP = (rule.mean[:, None] * f).T @ rule.at @ root.T
+    dP = NP + NP.T
+    if system.diffusion is not None:
+        diffusion = system.diffusion
+        G = jnp.tensordot(rule.mean, jax.vmap(lambda x: jnp.asarray(diffusion(t, x)))(x), 1)
+        V = jnp.eye(G.shape[1]) if system.diffusion_cov is None else jnp.asarray(system.diffusion_cov)
+        dP = dP + G @ V @ G.T
+    return Gaussian(rule.mean @ f, dP)
+
+
+def _update(count: int, seen: Observation, t: Any, prior: Gaussian, y: Any) -> tuple[Gaussian, UpdateInfo]:
+    """(2), deviations of h formed from h(m) as the system forms residuals."""
+    centre = seen.function(t, prior.mean, jnp.zeros(len(seen.cov)))
+
+    def deviation(x: Any, v: Any) -> Any:
+        return seen.innovation(seen.function(t, x, v), centre)
+
+    d, A, D = _line(count, seen, t, prior, deviation)
+    z = seen.innovation(y, centre + d)
+    foretold = predicted(seen, y, z, A @ A.T + D @ D.T, square_root(prior.cov) @ A.T)
+    return correct(prior, foretold, seen.limiter)

@@ -1,0 +1,78 @@
+"""What a problem in discrete time is: transition and measurement with noise that need not be additive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from nlbench.moments.moments import Moments
+    from nlbench.systems.system import Coordinate
+
+Function = Callable[..., Any]
+
+
+@dataclass(frozen=True)
+class DiscreteSystem:
+    """A system x(k+1) = f(k, x(k), w), y(k) = h(k, x(k), v), with w ~ N(0, Q) and v ~ N(0, R) independent.
+
+    Time is the step index k: `predict` from k to k + 1 applies the transition once. Additive noise, x + w, and
+    state-dependent noise, G(x) w, are special cases. Shapes are those of one trajectory: n states, m measurements,
+    s process noises, q measurement noises.
+
+    transition: (k, x, w) -> (n,). observe: (k, x, v) -> (m,).
+    process_cov: (s, s), the covariance Q of w. measurement_cov: (q, q), the covariance R of v.
+    initial: moments at step 0 that the filters start from, and that `sample` defaults to (normal).
+    truth: another system that makes the data, when truth and filter model differ.
+    sample: key -> (n,) draws an initial state.
+    residual: (y, h) -> (m,), y - h unless given (to wrap an angle, say).
+    coordinates: names and units of the errors; default x1 ... xn (x for one state).
+    error: (x, m) -> (c,) errors, true state minus estimate m of this system's state; default x - m.
+    diverged: (c,) errors -> bool; default: never, apart from errors that are not finite.
+    clip: (c,) bound on |error| in `rms_clipped`; default infinite.
+    inputs: k -> known inputs u(k), then transition takes (k, x, w, u).
+    exact: what the exact reference is made of, where there is one.
+    """
+
+    transition: Function
+    observe: Function
+    process_cov: Any
+    measurement_cov: Any
+    initial: Moments
+    truth: DiscreteSystem | None = None
+    sample: Function | None = None
+    residual: Function | None = None
+    coordinates: tuple[Coordinate, ...] | None = None
+    error: Function | None = None
+    diverged: Function | None = None
+    clip: tuple[float, ...] | None = None
+    inputs: Function | None = None
+    exact: Any = None
+
+    @property
+    def states(self) -> int:
+        """Number of states n."""
+        return len(self.initial.mean)
+
+    @property
+    def noises(self) -> int:
+        """Number of process noises s."""
+        return len(self.process_cov)
+
+    @property
+    def measurements(self) -> int:
+        """Number of measurements m taken at one time; it may differ from the number of noises q."""
+        import jax
+        import jax.numpy as jnp
+
+        x, v = jnp.zeros(self.states), jnp.zeros(len(self.measurement_cov))
+        return len(jax.eval_shape(lambda x, v: jnp.asarray(self.observe(0, x, v)), x, v))
+
+    def transition_with_inputs(self, k: Any, x: Any, w: Any) -> Any:
+        """f(k, x, w), the known inputs u(k) put in: (n,)."""
+        return self.transition(k, x, w) if self.inputs is None else self.transition(k, x, w, self.inputs(k))
+
+    def innovation(self, y: Any, h: Any) -> Any:
+        """y - h, or what the system puts in its place: (m,)."""
+        return y - h if self.residual is None else self.residual(y, h)

@@ -1,0 +1,101 @@
+"""Claim: runs with continuous measurements agree with an independent implementation within 5 combined standard errors.
+
+Clipped RMS, medians and counts of divergence of every filter, every statistic of those without heavy tails.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+import nlbench as nb
+from nlbench import config
+
+PUBLISHED = json.loads((Path(__file__).parents[1] / "golden" / "experiments_continuous.json").read_text())
+CULVER = {
+    "LK": {"name": "linearised-kalman"},
+    "second": {"name": "kushner-2"},
+    "third": {"name": "kushner-3"},
+    "fourth_corrected": {"name": "kushner-4"},
+    "fourth_printed": {"name": "kushner-4", "equations": "printed-scalar"},
+    "third_eq4.75_printed": {"name": "kushner-3", "equations": "printed"},
+}
+SCHWARTZ = {
+    "1 linear": {"name": "schwartz-1", "nominal": 0.0},
+    "2 quasi-moment": {"name": "schwartz-2"},
+    "3 truncated": {"name": "schwartz-3"},
+    "4 modified MV": {"name": "schwartz-4"},
+    "5 max-principle LS": {"name": "schwartz-5"},
+    "6 dyn-prog LS": {"name": "schwartz-6"},
+    "7 discrete MV": {"name": "schwartz-7"},
+    "8 mod discrete MV": {"name": "schwartz-8"},
+    "3 printed h'' gain": {"name": "schwartz-3", "equations": "printed"},
+    "4 printed h'' gain": {"name": "schwartz-4", "equations": "printed"},
+    "7 printed without p^2": {"name": "schwartz-7", "equations": "printed"},
+}
+THREE = {
+    "1 linear": {"name": "schwartz-1", "nominal": 0.0},
+    "2=3=4=7=8 minimal variance": {"name": "schwartz-2"},
+    "5=6 least squares": {"name": "schwartz-5"},
+}
+GROUPS = {
+    "7.7-7.9/M/dt=0.001": (
+        {"name": "culver-scalar", "measurement": "continuous", "measurement_variance": 0.16},
+        CULVER,
+        2.0,
+    ),
+    "schwartz/D1/M11": ({"name": "schwartz"}, SCHWARTZ, 5.0),
+    "schwartz/D2/M22": ({"name": "schwartz", "dynamics": "D2", "measurement": "M22"}, THREE, 5.0),
+}
+ROBUST = ("rms_clipped", "median_error")
+WELL_BEHAVED = ("LK", "second", "EXACT")  # of the group 7.7-7.9; all of Schwartz's are
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("group", GROUPS)
+def test_agrees_with_an_independent_implementation(group, tmp_path):
+    system, entries, end = GROUPS[group]
+    labels = {name: f"f{place}" for place, name in enumerate(entries)}
+    reference = {}
+    if system["name"] == "culver-scalar":
+        labels, reference = {**labels, "EXACT": "exact"}, {"reference": "exact"}
+    results = nb.run(
+        config.from_dict(
+            {
+                "experiment": "published",
+                "system": system,
+                "filters": [{**entry, "label": labels[name]} for name, entry in entries.items()],
+                "time": {"end": end, "step": 0.001, "output": 0.1},
+                "report_times": [float(time) for time in PUBLISHED[group][next(iter(entries))]],
+                "monte_carlo": {"runs": 20_000, "seed": 7},
+                **reference,
+            }
+        ),
+        tmp_path,
+    )
+    table = results.table("statistics").set_index(["filter", "time", "statistic", "coordinate"])
+    compared = 0
+    for name, label in labels.items():
+        everything = group.startswith("schwartz") or name in WELL_BEHAVED
+        for time, statistics in PUBLISHED[group][name].items():
+            for statistic, (value, stderr, runs) in statistics.items():
+                where = (label, str(float(time)), statistic)
+                if statistic == "diverged":
+                    mine = table.loc[(*where, "all")]
+                    _same_rate(mine.value * mine.n, mine.n, value, runs, (name, *where))
+                elif everything or statistic in ROBUST:
+                    mine = table.loc[(*where, "x")]
+                    error = math.hypot(mine.stderr, stderr)
+                    assert abs(mine.value - value) <= max(5 * error, 1e-5 * abs(value)), (name, *where)
+                else:
+                    continue
+                compared += 1
+    assert compared >= 15 * len(labels)
+
+
+def _same_rate(count: float, n: int, other: float, runs: int, where: tuple) -> None:
+    rate = max(count + other, 1.0) / (n + runs)
+    assert abs(count / n - other / runs) <= 5 * math.sqrt(rate * (1 / n + 1 / runs)), where
