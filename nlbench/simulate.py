@@ -65,11 +65,13 @@ def initial_state(system: System, key: Any, trajectory: Trajectory) -> Any:
 
 class Simulated(NamedTuple):
     """Of one trajectory: states at the ends of the schedule's segments, the start first, (segments + 1, n);
-    measurements at fixed times (M, m); noise of the sightings (K, m)."""
+    measurements at fixed times (M, m); noise of the sightings (K, m); key of the filters' own random numbers, as plain
+    numbers, the same for all filters."""
 
     states: Any
     measurements: Any
     noise: Any
+    key: Any
 
 
 def simulate(system: System, schedule: Schedule, key: Any, trajectory: Trajectory) -> Simulated:
@@ -83,13 +85,14 @@ def simulate(system: System, schedule: Schedule, key: Any, trajectory: Trajector
     if schedule.continuous:  # white noise of that spectral density, as a sample held over a step
         variance = variance / schedule.step
     noise = jax.random.normal(own, (count, system.measurements)) @ root(variance)
+    drawing = jax.random.key_data(trajectory_key(key, trajectory.high, trajectory.low, FILTER))
     if not schedule.measurements:
-        return Simulated(states, noise[:0], noise)
+        return Simulated(states, noise[:0], noise, drawing)
     times = jnp.asarray(schedule.measurement_times)
     every = schedule.measured_every
     measured = states[:-1] if schedule.continuous else states[every::every]
     h = jax.vmap(lambda t, x: _stacked(system.observe(t, x)))(times, measured)
-    return Simulated(states, h + noise, noise[:0])
+    return Simulated(states, h + noise, noise[:0], drawing)
 
 
 def path(system: System, schedule: Schedule, key: Any, start: Any) -> Any:

@@ -90,6 +90,7 @@ def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) ->
         rates=rates,
         integrate=clock.integrate,
         components=lambda state: components(whole(state)),
+        random=True,
         angle=(lambda state: sightings.angle(whole(state).mean)) if sightings else None,
     )
 

@@ -71,6 +71,7 @@ def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) ->
         rates=rates,
         integrate=clock.integrate,
         components=lambda state: components(_sample_moments(state.x)),
+        random=True,
         angle=(lambda state: sightings.angle(jnp.mean(state.x, 0))) if sightings else None,
     )
 

@@ -150,4 +150,4 @@ def followed(problem: Problem, runner: Runner, data: Simulated) -> Followed:
     """One filter along the data of a block."""
     if problem.schedule.sightings:
         return follow_sightings(problem, runner, data)
-    return follow(runner, problem.schedule, data.measurements, problem.block)
+    return follow(runner, problem.schedule, data.measurements, problem.block, data.key)

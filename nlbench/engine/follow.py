@@ -22,10 +22,10 @@ class Followed(NamedTuple):
     updates: Any
 
 
-def follow(runner: Runner, schedule: Schedule, measurements: Any, lanes: int) -> Followed:
-    """The filter along the measurements (M, m, L) of a block."""
+def follow(runner: Runner, schedule: Schedule, measurements: Any, lanes: int, keys: Any = None) -> Followed:
+    """The filter along the measurements (M, m, L) of a block. keys: (2, L), for a filter that draws random numbers."""
     filter = runner.filter
-    start = spread(filter.init(runner.initial), lanes)
+    start = begun(runner, lanes, keys)
     span = runner.step * runner.steps
 
     def segment(number: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
@@ -71,10 +71,13 @@ def follow(runner: Runner, schedule: Schedule, measurements: Any, lanes: int) ->
     return Followed(components, guarded, jnp.full(lanes, schedule.measurements))
 
 
-def spread(state: Any, lanes: int) -> Any:
-    """The state of one trajectory in every lane."""
+def begun(runner: Runner, lanes: int, keys: Any) -> Any:
+    """The state that the filter starts from, in every lane; with random numbers of its own, if it draws any."""
+    if runner.filter.random:
+        return over_lanes(lambda key: runner.filter.init(runner.initial, key))(keys)
     return jax.tree.map(
-        lambda leaf: jnp.broadcast_to(jnp.asarray(leaf)[..., None], (*jnp.shape(leaf), lanes)), state
+        lambda leaf: jnp.broadcast_to(jnp.asarray(leaf)[..., None], (*jnp.shape(leaf), lanes)),
+        runner.filter.init(runner.initial),
     )
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from nlbench.engine.follow import Followed, emitted, joined, over_lanes, spread
+from nlbench.engine.follow import Followed, begun, emitted, joined, over_lanes
 from nlbench.orbit import wrapped
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def follow_sightings(problem: Problem, runner: Runner, data: Simulated) -> Follo
         after = jax.lax.while_loop(lambda now: now.step < last, leg, before)
         return after, emitted(filter, after.state)
 
-    state = spread(filter.init(runner.initial), lanes)
+    state = begun(runner, lanes, data.key)
     none = jnp.zeros(lanes, int)
     start = Progress(jnp.asarray(0), state, jnp.zeros(lanes), jnp.zeros(lanes, bool), made=none, guarded=none)
     end, outputs = jax.lax.scan(to_output, start, jnp.arange(schedule.outputs))

@@ -37,6 +37,7 @@ class Filter(NamedTuple):
     rates: (state, t, y=None) -> Moments, their time derivatives between measurements.
     integrate: (state, t, h, count) -> state, `count` steps of h from t; what `predict` and the engine call.
     components: state -> Components, the unique components of the moments.
+    random: whether it draws random numbers, from the key that `init` is given.
     angle: state -> the central angle that sightings wait for; None without sightings.
     history: (state, times (T,)) -> Components (T,): the moments at earlier times, for a filter that remembers all it
         needs and computes them dearly; the engine then asks for them once, at the end. None for the others.
@@ -51,6 +52,7 @@ class Filter(NamedTuple):
     rates: Callable
     integrate: Callable
     components: Callable
+    random: bool = False
     angle: Callable | None = None
     history: Callable | None = None
 

@@ -16,6 +16,8 @@ from nlbench.filters import catalogue
 from tests.oracle import hermite_density, outer, placements, random_cov, rng, symmetrise
 from tests.problems import dense
 
+pytestmark = pytest.mark.long  # minutes of compiling, all filters together
+
 NAMES = [
     name for name in nb.filters.available() if catalogue.row(name, continuous=True).family == "continuous"
 ]

@@ -24,7 +24,7 @@ def data(system, number=0, step=STEP, end=END):
     words = [0, number, 0, number]
     trajectory = sim.Trajectory(*map(jnp.uint32, words), jnp.int32(0))
     key = sim.seed_key(jnp.uint32(0), jnp.uint32(SEED))
-    states, y, _ = jax.jit(lambda k, n: sim.simulate(system, schedule, k, n))(key, trajectory)
+    states, y, *_ = jax.jit(lambda k, n: sim.simulate(system, schedule, k, n))(key, trajectory)
     return np.asarray(states), np.asarray(y), schedule
 
 

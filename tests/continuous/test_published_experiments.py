@@ -54,7 +54,7 @@ ROBUST = ("rms_clipped", "median_error")
 WELL_BEHAVED = ("LK", "second", "EXACT")  # of the group 7.7-7.9; all of Schwartz's are
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("group", GROUPS)
 def test_agrees_with_an_independent_implementation(group, tmp_path):
     system, entries, end = GROUPS[group]

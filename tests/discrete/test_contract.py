@@ -15,6 +15,8 @@ from nlbench.discrete.catalogue import ROWS
 from nlbench.errors import ConfigError
 from tests.oracle import kalman_predict_rk4, kalman_update, random_cov, rng
 
+pytestmark = pytest.mark.long  # minutes of compiling, all filters together
+
 SAMPLING = {"ensemble": {"particles": 4000}, "bootstrap": {"particles": 4000}}
 EXACT = [name for name in ROWS if name not in SAMPLING]
 EVERY = pytest.mark.parametrize("name", ROWS)

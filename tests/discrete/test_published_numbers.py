@@ -7,7 +7,7 @@ import pytest
 
 from tests.discrete.problems import bearings, reentry, squared_errors, ungm
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 
 def measured(errors, root):

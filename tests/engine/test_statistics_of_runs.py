@@ -51,7 +51,7 @@ def test_every_trajectory_is_the_filter_applied_to_the_simulation(matched):
     kept = matched.table("runs")
     kept = kept[kept["filter"] == "third-order"].set_index(["run", "time"]).x
     for number in range(0, 200, 23):
-        states, y, _ = simulated(Trajectory(*words(number), *words(number), np.int32(0)))
+        states, y, *_ = simulated(Trajectory(*words(number), *words(number), np.int32(0)))
         early, late = followed(y)
         assert kept[number, 0.2] == pytest.approx(float(states[2, 0] - early), rel=1e-9, abs=1e-12)
         assert kept[number, 0.6] == pytest.approx(float(states[6, 0] - late), rel=1e-9, abs=1e-12)

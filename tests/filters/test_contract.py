@@ -23,7 +23,12 @@ NAMES = [name for name, row in FILTERS.items() if row.family == "moment"]
 OTHERS = sorted(set(FILTERS) - set(NAMES))
 # Updates that integrate in pseudo-time agree with the Kalman filter as far as their steps do, with an error of order 4.
 FINE = {"integration-update": {"steps": 400}}
-EVERY = pytest.mark.parametrize("name", NAMES)
+# Those with updates that look beyond the linearised measurement compile for minutes, all together.
+CURVED = ("series", "tempering", "two-step", "direct", "quadrature")
+EVERY = pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.long if FILTERS[name].update in CURVED else ()) for name in NAMES],
+)
 F = np.array([[0.0, 1.0], [-1.0, -0.3]])
 C = np.array([0.2, 0.0])
 G = np.array([[0.0], [0.8]])

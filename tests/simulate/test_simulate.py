@@ -33,7 +33,7 @@ def culver(**parameters):
 
 def one(system, number=0, seed=1969, end=2.0, output=0.1, set_size=1, step=0.02):
     schedule = make(end, step, output, system.interval)
-    states, y, _ = jax.jit(lambda k, n: sim.simulate(system, schedule, k, n))(
+    states, y, *_ = jax.jit(lambda k, n: sim.simulate(system, schedule, k, n))(
         key(seed), trajectory(number, set_size)
     )
     return np.asarray(states), np.asarray(y), schedule
@@ -44,7 +44,7 @@ def many(system, count, end, step, interval):
     low, zero = jnp.arange(count, dtype=jnp.uint32), jnp.zeros(count, jnp.uint32)
     numbers = sim.Trajectory(zero, low, zero, low, zero)
     run = jax.jit(jax.vmap(lambda n: sim.simulate(system, schedule, key(), n)))
-    states, y, _ = run(numbers)
+    states, y, *_ = run(numbers)
     return np.asarray(states), np.asarray(y), schedule
 
 

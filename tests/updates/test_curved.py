@@ -13,6 +13,8 @@ import nlbench as nb
 from tests.oracle import bayes, fourth_moment, kalman_update, random_cov, rng, symmetrise
 from tests.problems import dense, linear_measurement, updated
 
+pytestmark = pytest.mark.long  # minutes of compiling, all filters together
+
 CURVED = (
     "series-3", "series-4", "integration-update", "two-step-2", "two-step-3", "direct-2", "direct-3",
     "quadrature-2", "quadrature-3",
