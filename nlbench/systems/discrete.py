@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from nlbench.moments.moments import Moments
-    from nlbench.systems.system import Coordinate
+    from nlbench.systems.system import Coordinate, LateError
 
 Function = Callable[..., Any]
 
@@ -30,9 +30,13 @@ class DiscreteSystem:
     coordinates: names and units of the errors; default x1 ... xn (x for one state).
     error: (x, m) -> (c,) errors, true state minus estimate m of this system's state; default x - m.
     diverged: (c,) errors -> bool; default: never, apart from errors that are not finite.
+    diverged_stays: whether a run diverged at a report time counts as diverged ever after.
+    diverged_late: a rule that is judged once, at the end of a run.
     clip: (c,) bound on |error| in `rms_clipped`; default infinite.
     inputs: k -> known inputs u(k), then transition takes (k, x, w, u).
+    interval: steps between measurements, the first at step `interval`; None means that nothing is measured.
     exact: what the exact reference is made of, where there is one.
+    norms: named norms of the errors, each with the coordinates that it joins.
     """
 
     transition: Function
@@ -46,9 +50,13 @@ class DiscreteSystem:
     coordinates: tuple[Coordinate, ...] | None = None
     error: Function | None = None
     diverged: Function | None = None
+    diverged_stays: bool = False
+    diverged_late: LateError | None = None
     clip: tuple[float, ...] | None = None
     inputs: Function | None = None
+    interval: int | None = 1
     exact: Any = None
+    norms: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     @property
     def states(self) -> int:
