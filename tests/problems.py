@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -73,3 +74,14 @@ def dense(moments):
         None if a is None else np.asarray(a)
         for a in (moments.mean, moments.cov, moments.third, moments.fourth)
     )
+
+
+def assert_vmap_equals_a_loop(function, states, t, y, rtol, atol):
+    """function: (state, t, y) -> pytree, of the states one by one and of all together; y has a row for each."""
+    stacked = jax.tree.map(lambda *parts: jnp.stack(parts), *states)
+    together = jax.jit(jax.vmap(function, in_axes=(0, None, 0)))(stacked, t, y)
+    step = jax.jit(function)
+    for lane, state in enumerate(states):
+        alone = step(state, t, y[lane])
+        for mine, theirs in zip(jax.tree.leaves(together), jax.tree.leaves(alone), strict=True):
+            np.testing.assert_allclose(mine[lane], theirs, rtol=rtol, atol=atol)

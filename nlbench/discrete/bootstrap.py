@@ -21,16 +21,14 @@ import jax.numpy as jnp
 
 from nlbench.discrete import particles
 from nlbench.discrete.correction import Gaussian, information, predicted
-from nlbench.discrete.gaussian import components
 from nlbench.discrete.mixture import overall
 from nlbench.discrete.points import square_root
 from nlbench.discrete.problem import observation
 from nlbench.errors import ConfigError
-from nlbench.filters.filter import Filter, UpdateInfo
-from nlbench.moments.moments import Moments
 
 if TYPE_CHECKING:
     from nlbench.discrete.problem import Observation
+    from nlbench.filters.filter import Filter, UpdateInfo
     from nlbench.row import Row
     from nlbench.systems.discrete import DiscreteSystem
     from nlbench.systems.system import System
@@ -45,63 +43,36 @@ class Particles(NamedTuple):
 
 
 def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) -> Filter:
-    """`options.particles` particles. A key that is None is taken from the state.
+    """`options.particles` particles.
 
     Raises `ConfigError` where noise enters the measurement nonlinearly: its density is then not known.
     """
-    seen = observation(system, options)
-    if not seen.linear:
+    if not observation(system, options).linear:
         raise ConfigError(
             f"{name}: noise enters the measurement nonlinearly, so the density of y given x is not known; "
             "ensemble takes such systems"
         )
-    clock = particles.clock(system, options.step or getattr(system, "default_step", None))
-    count = options.particles
 
-    def init(moments: Moments, key: Any = None) -> Particles:
-        carried, used = particles.split(particles.raw(key))
-        x = particles.drawn(moments, used, count)
-        return Particles(x, jnp.full(count, -math.log(count)), carried)
+    def start(x: Any, key: Any) -> Particles:
+        return Particles(x, jnp.full(len(x), -math.log(len(x))), key)
 
-    def predict(state: Particles, t0: Any, t1: Any, key: Any = None) -> Particles:
-        return clock.predict(_with(state, key), t0, t1)
-
-    def updated(
-        state: Particles, t: Any, y: Any, key: Any = None, sighting: Any = None
-    ) -> tuple[Particles, UpdateInfo]:
-        sighted = seen if sighting is None else observation(system.sighted(sighting), options)
-        weighed, info = _weighed(sighted, _with(state, key), t, jnp.asarray(y))
+    def update(seen: Observation, prior: Particles, t: Any, y: Any) -> tuple[Particles, UpdateInfo]:
+        weighed, info = _weighed(seen, prior, t, y)
         return _resampled(weighed, options.threshold), info
 
-    def rates(state: Particles, t: Any, y: Any = None) -> Moments:
-        raise ConfigError(f"{name}: its moments are those of a sample and have no time derivatives")
-
-    def whole(state: Particles) -> Gaussian:
-        return _moments(jnp.exp(state.log_weights), state.x)
-
-    sightings = getattr(system, "sightings", None)
-    return Filter(
-        name=name,
-        system=system,
-        init=init,
-        predict=predict,
-        update=updated,
-        moments=lambda state: Moments(*whole(state)),
-        rates=rates,
-        integrate=clock.integrate,
-        components=lambda state: components(whole(state)),
-        random=True,
-        angle=(lambda state: sightings.angle(whole(state).mean)) if sightings else None,
+    return particles.bind(
+        name,
+        system,
+        options,
+        start,
+        update,
+        lambda state: _moments(jnp.exp(state.log_weights), state.x),
     )
 
 
 def effective(state: Particles) -> Any:
     """(2), how many particles of equal weight would say as much."""
     return 1 / jnp.sum(jnp.exp(2 * state.log_weights))
-
-
-def _with(state: Particles, key: Any) -> Particles:
-    return state if key is None else state._replace(key=particles.raw(key))
 
 
 def _moments(weights: Any, x: Any) -> Gaussian:

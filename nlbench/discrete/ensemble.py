@@ -18,15 +18,11 @@ import jax.numpy as jnp
 
 from nlbench.discrete import particles
 from nlbench.discrete.correction import Gaussian, information, predicted, symmetric
-from nlbench.discrete.gaussian import components
 from nlbench.discrete.points import square_root
-from nlbench.discrete.problem import observation
-from nlbench.errors import ConfigError
-from nlbench.filters.filter import Filter, UpdateInfo
-from nlbench.moments.moments import Moments
 
 if TYPE_CHECKING:
     from nlbench.discrete.problem import Observation
+    from nlbench.filters.filter import Filter, UpdateInfo
     from nlbench.row import Row
     from nlbench.systems.discrete import DiscreteSystem
     from nlbench.systems.system import System
@@ -40,44 +36,8 @@ class Ensemble(NamedTuple):
 
 
 def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) -> Filter:
-    """An ensemble of `options.particles` states. A key that is None is taken from the state."""
-    seen = observation(system, options)
-    clock = particles.clock(system, options.step or getattr(system, "default_step", None))
-
-    def init(moments: Moments, key: Any = None) -> Ensemble:
-        carried, used = particles.split(particles.raw(key))
-        return Ensemble(particles.drawn(moments, used, options.particles), carried)
-
-    def predict(state: Ensemble, t0: Any, t1: Any, key: Any = None) -> Ensemble:
-        return clock.predict(_with(state, key), t0, t1)
-
-    def updated(
-        state: Ensemble, t: Any, y: Any, key: Any = None, sighting: Any = None
-    ) -> tuple[Ensemble, UpdateInfo]:
-        sighted = seen if sighting is None else observation(system.sighted(sighting), options)
-        return _updated(sighted, _with(state, key), t, jnp.asarray(y))
-
-    def rates(state: Ensemble, t: Any, y: Any = None) -> Moments:
-        raise ConfigError(f"{name}: its moments are those of a sample and have no time derivatives")
-
-    sightings = getattr(system, "sightings", None)
-    return Filter(
-        name=name,
-        system=system,
-        init=init,
-        predict=predict,
-        update=updated,
-        moments=lambda state: Moments(*_sample_moments(state.x)),
-        rates=rates,
-        integrate=clock.integrate,
-        components=lambda state: components(_sample_moments(state.x)),
-        random=True,
-        angle=(lambda state: sightings.angle(jnp.mean(state.x, 0))) if sightings else None,
-    )
-
-
-def _with(state: Ensemble, key: Any) -> Ensemble:
-    return state if key is None else state._replace(key=particles.raw(key))
+    """An ensemble of `options.particles` states."""
+    return particles.bind(name, system, options, Ensemble, _updated, lambda state: _sample_moments(state.x))
 
 
 def _sample_moments(x: Any) -> Gaussian:

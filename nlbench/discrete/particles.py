@@ -1,4 +1,4 @@
-"""Samples of the state and how they move: what the ensemble and the particle filter share."""
+"""Samples of the state, how they move and make a filter: what the ensemble and the particle filter share."""
 
 from __future__ import annotations
 
@@ -8,15 +8,68 @@ from typing import TYPE_CHECKING, Any
 import jax
 import jax.numpy as jnp
 
+from nlbench.discrete.gaussian import components
 from nlbench.discrete.points import square_root
-from nlbench.discrete.problem import stacked, transition
+from nlbench.discrete.problem import observation, stacked, transition
 from nlbench.discrete.time import Clock
+from nlbench.errors import ConfigError
+from nlbench.filters.filter import Filter, UpdateInfo
 from nlbench.moments.integrate import fixed_rk4
+from nlbench.moments.moments import Moments
 from nlbench.systems.discrete import DiscreteSystem
 
 if TYPE_CHECKING:
-    from nlbench.moments.moments import Moments
+    from nlbench.discrete.correction import Gaussian
     from nlbench.systems.system import System
+
+
+def bind(
+    name: str,
+    system: System | DiscreteSystem,
+    options: Any,
+    start: Callable[[Any, Any], Any],
+    update: Callable[..., tuple[Any, UpdateInfo]],
+    whole: Callable[[Any], Gaussian],
+) -> Filter:
+    """A filter whose state has fields `x` (N, n) and `key`, plain numbers; `options.particles` is N.
+
+    start: (x, key) -> state. update: (seen, prior, t, y) -> (state, UpdateInfo). whole: state -> mean and covariance.
+    A key that is None is taken from the state.
+    """
+    seen = observation(system, options)
+    ticks = clock(system, options.step or getattr(system, "default_step", None))
+    sightings = getattr(system, "sightings", None)
+
+    def keyed(state: Any, key: Any) -> Any:
+        return state if key is None else state._replace(key=raw(key))
+
+    def init(moments: Moments, key: Any = None) -> Any:
+        carried, used = split(raw(key))
+        return start(drawn(moments, used, options.particles), carried)
+
+    def predict(state: Any, t0: Any, t1: Any, key: Any = None) -> Any:
+        return ticks.predict(keyed(state, key), t0, t1)
+
+    def updated(state: Any, t: Any, y: Any, key: Any = None, sighting: Any = None) -> tuple[Any, UpdateInfo]:
+        sighted = seen if sighting is None else observation(system.sighted(sighting), options)
+        return update(sighted, keyed(state, key), t, jnp.asarray(y))
+
+    def rates(state: Any, t: Any, y: Any = None) -> Moments:
+        raise ConfigError(f"{name}: its moments are those of a sample and have no time derivatives")
+
+    return Filter(
+        name=name,
+        system=system,
+        init=init,
+        predict=predict,
+        update=updated,
+        moments=lambda state: Moments(*whole(state)),
+        rates=rates,
+        integrate=ticks.integrate,
+        components=lambda state: components(whole(state)),
+        random=True,
+        angle=(lambda state: sightings.angle(whole(state).mean)) if sightings else None,
+    )
 
 
 def drawn(moments: Moments, key: Any, count: int) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -10,6 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from nlbench.errors import ConfigError
+from nlbench.moments.integrate import steps_between
 
 
 class Clock(NamedTuple):
@@ -41,14 +41,7 @@ class Clock(NamedTuple):
         """integrate: (state, t, h, count) -> state. longest: bound on h; None means a tenth of the way."""
 
         def predict(state: Any, t0: Any, t1: Any) -> Any:
-            span = t1 - t0
-            if longest is None:
-                return integrate(state, t0, span / 10, 10)
-            if isinstance(span, (int, float)):
-                count = max(1, math.ceil(span / longest - 1e-9))
-            else:
-                count = jnp.maximum(1, jnp.ceil(span / longest - 1e-9)).astype(int)
-            return integrate(state, t0, span / count, count)
+            return integrate(state, t0, *steps_between(t0, t1, longest))
 
         return cls(integrate, predict, False)
 

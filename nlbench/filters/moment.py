@@ -8,7 +8,6 @@ O(n^(order + 1)), per update O(n^(order + 1)).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -67,13 +66,20 @@ def build(name: str, row: Row, system: System, options: Options) -> Filter:
     if system.measurement == "continuous":
         raise ConfigError(f"{name}: takes measurements at discrete times, and the system's are continuous")
     integrator = integration.build(**options.integrator.model_dump())
+    updated = _curved_update if row.update in CURVED else _linear_update
 
     def integrate(state: Components, t: Any, h: Any, count: Any) -> Components:
         return integrator.integrate(lambda t, y: dense(rates(system, row.order, t, y)), t, h, count, state)
 
     def predict(state: Components, t0: Any, t1: Any, key: Any = None) -> Components:
-        h, count = steps_between(t0, t1, options.step or system.default_step)
+        h, count = integration.steps_between(t0, t1, options.step or system.default_step)
         return integrate(state, t0, h, count)
+
+    def update(
+        state: Components, t: Any, y: Any, key: Any = None, sighting: Any = None
+    ) -> tuple[Components, UpdateInfo]:
+        seen = system if sighting is None else system.sighted(sighting)
+        return updated(seen, row, options, state, t, y)
 
     def state_rates(state: Components, t: Any, y: Any = None) -> Moments:
         found = rates(system, row.order, t, state)
@@ -87,7 +93,7 @@ def build(name: str, row: Row, system: System, options: Options) -> Filter:
         system=system,
         init=lambda moments, key=None: to_components(moments, row.order),
         predict=predict,
-        update=partial(_curved_update if row.update in CURVED else _update, system, row, options),
+        update=update,
         moments=to_full,
         rates=state_rates,
         integrate=integrate,
@@ -96,29 +102,10 @@ def build(name: str, row: Row, system: System, options: Options) -> Filter:
     )
 
 
-def steps_between(t0: Any, t1: Any, longest: float | None) -> tuple[Any, Any]:
-    """Length and number of the equal steps from t0 to t1, none longer than `longest` (None: a tenth of the way)."""
-    span = t1 - t0
-    if longest is None:
-        return span / 10, 10
-    if isinstance(span, (int, float)):
-        count = max(1, math.ceil(span / longest - 1e-9))
-        return span / count, count
-    count = jnp.maximum(1, jnp.ceil(span / longest - 1e-9)).astype(int)
-    return span / count, count
-
-
-def _update(
-    system: System,
-    row: Row,
-    options: Options,
-    state: Components,
-    t: Any,
-    y: Any,
-    key: Any = None,
-    sighting: Any = None,
+def _linear_update(
+    system: System, row: Row, options: Options, state: Components, t: Any, y: Any
 ) -> tuple[Components, UpdateInfo]:
-    system = system if sighting is None else system.sighted(sighting)
+    """An update of `UPDATES`."""
     made = shared(partial(_updated, system, row, options, t), t, state, y, reused=True)
     # Where the guard fires the predictive density is Gaussian.
     density_ratio = jnp.where(made.fired, 0.0, made.nu)
@@ -164,16 +151,9 @@ def _updated(system: System, row: Row, options: Options, t: Any, state: Componen
 
 
 def _curved_update(
-    system: System,
-    row: Row,
-    options: Options,
-    state: Components,
-    t: Any,
-    y: Any,
-    key: Any = None,
-    sighting: Any = None,
+    system: System, row: Row, options: Options, state: Components, t: Any, y: Any
 ) -> tuple[Components, UpdateInfo]:
-    system = system if sighting is None else system.sighted(sighting)
+    """An update of `CURVED`."""
     measurement = linearise(system, t, state, y, options.missing)
     gained = gain(state.cov, measurement)
     clipped = None if options.limiter is None else limited(measurement.z, gained.S_z, options.limiter)

@@ -6,6 +6,7 @@ it too; its `advance` is the step of the hot loop.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
@@ -143,3 +144,15 @@ def by_name(name: str, rtol: float | None = None, atol: float | None = None) -> 
 def build(solver: str, rtol: float | None = None, atol: float | None = None) -> Integrator:
     """`fixed_rk4` for "rk4", otherwise the diffrax solver of that name."""
     return fixed_rk4() if solver == "rk4" else by_name(solver, rtol, atol)
+
+
+def steps_between(t0: Any, t1: Any, longest: float | None) -> tuple[Any, Any]:
+    """Length and number of the equal steps from t0 to t1, none longer than `longest` (None: a tenth of the way)."""
+    span = t1 - t0
+    if longest is None:
+        return span / 10, 10
+    if isinstance(span, (int, float)):
+        count = max(1, math.ceil(span / longest - 1e-9))
+        return span / count, count
+    count = jnp.maximum(1, jnp.ceil(span / longest - 1e-9)).astype(int)
+    return span / count, count

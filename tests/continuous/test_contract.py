@@ -14,7 +14,7 @@ import nlbench as nb
 from nlbench.errors import ConfigError
 from nlbench.filters import catalogue
 from tests.oracle import hermite_density, outer, placements, random_cov, rng, symmetrise
-from tests.problems import dense
+from tests.problems import assert_vmap_equals_a_loop, dense
 
 pytestmark = pytest.mark.long  # minutes of compiling, all filters together
 
@@ -235,16 +235,11 @@ def test_a_loop_is_traced_once_and_a_scan_carries_the_state(name):
 
 @EVERY
 def test_vmap_equals_a_loop(name):
-    f, step, _ = nonlinear_filter(name)
+    f, _, _ = nonlinear_filter(name)
     g = rng(2)
     starts = [f.init(nb.Moments(g.normal(size=2), 0.2 * random_cov(g, 2))) for _ in range(3)]
     y = jnp.asarray(g.normal(size=(3, 2)))
-    stacked = jax.tree.map(lambda *parts: jnp.stack(parts), *starts)
-    together = jax.jit(jax.vmap(f.update, in_axes=(0, None, 0)))(stacked, jnp.asarray(0.0), y)
-    for lane in range(3):
-        alone = step(starts[lane], jnp.asarray(0.0), y[lane])
-        for mine, theirs in zip(jax.tree.leaves(together), jax.tree.leaves(alone), strict=True):
-            np.testing.assert_allclose(mine[lane], theirs, rtol=1e-11, atol=1e-12)
+    assert_vmap_equals_a_loop(f.update, starts, jnp.asarray(0.0), y, rtol=1e-11, atol=1e-12)
 
 
 @EVERY

@@ -14,6 +14,7 @@ import nlbench as nb
 from nlbench.discrete.catalogue import ROWS
 from nlbench.errors import ConfigError
 from tests.oracle import kalman_predict_rk4, kalman_update, random_cov, rng
+from tests.problems import assert_vmap_equals_a_loop
 
 pytestmark = pytest.mark.long  # minutes of compiling, all filters together
 
@@ -256,16 +257,11 @@ def test_a_loop_is_traced_once_and_moments_are_exactly_symmetric(name):
 
 @EVERY
 def test_vmap_equals_a_loop(name):
-    f, step, _ = stepping(name)
+    f, _, _ = stepping(name)
     g = rng(2)
     starts = [f.init(nb.Moments(g.normal(size=2), 0.2 * random_cov(g, 2))) for _ in range(3)]
     y = jnp.asarray(g.normal(size=(3, 2)))
-    stacked = jax.tree.map(lambda *parts: jnp.stack(parts), *starts)
-    together = jax.jit(jax.vmap(cycle(f), in_axes=(0, None, 0)))(stacked, jnp.asarray(0), y)
-    for lane in range(3):
-        alone = step(starts[lane], jnp.asarray(0), y[lane])
-        for mine, theirs in zip(jax.tree.leaves(together), jax.tree.leaves(alone), strict=True):
-            np.testing.assert_allclose(mine[lane], theirs, rtol=1e-9, atol=1e-11)
+    assert_vmap_equals_a_loop(cycle(f), starts, jnp.asarray(0), y, rtol=1e-9, atol=1e-11)
 
 
 @pytest.mark.parametrize("name", [name for name in EXACT if name not in ("kalman", "bootstrap")])

@@ -17,7 +17,7 @@ from nlbench.errors import ConfigError
 from nlbench.filters.catalogue import FILTERS, row
 from nlbench.systems.discrete import DiscreteSystem
 from tests.oracle import kalman_predict_rk4, kalman_update, random_cov, rng, symmetrise
-from tests.problems import dense
+from tests.problems import assert_vmap_equals_a_loop, dense
 
 NAMES = [name for name, row in FILTERS.items() if row.family == "moment"]
 OTHERS = sorted(set(FILTERS) - set(NAMES))
@@ -184,7 +184,7 @@ def test_a_scan_carries_the_state(name):
 
 @EVERY
 def test_vmap_equals_a_loop(name):
-    f, step, _ = nonlinear_filter(name)
+    f, _, _ = nonlinear_filter(name)
     g = rng(2)
     starts = [
         f.init(
@@ -193,12 +193,7 @@ def test_vmap_equals_a_loop(name):
         for _ in range(5)
     ]
     y = jnp.asarray(g.normal(size=(5, 1)))
-    stacked = jax.tree.map(lambda *parts: jnp.stack(parts), *starts)
-    together = jax.jit(jax.vmap(cycle(f), in_axes=(0, None, 0)))(stacked, jnp.asarray(0.0), y)
-    for lane in range(5):
-        alone = step(starts[lane], jnp.asarray(0.0), y[lane])
-        for mine, theirs in zip(jax.tree.leaves(together), jax.tree.leaves(alone), strict=True):
-            np.testing.assert_allclose(mine[lane], theirs, rtol=1e-12, atol=1e-13)
+    assert_vmap_equals_a_loop(cycle(f), starts, jnp.asarray(0.0), y, rtol=1e-12, atol=1e-13)
 
 
 @EVERY
