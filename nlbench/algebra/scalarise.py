@@ -17,15 +17,11 @@ import jax.extend.core
 import jax.numpy as jnp
 import numpy as np
 
-from nlbench.algebra.scalars import Scalar, add, is_known, multiply
+from nlbench.algebra.elementwise import ARITHMETIC, ELEMENTWISE, REDUCTIONS, array, bind
+from nlbench.algebra.scalars import Scalar, is_known, multiply
 
 Nodes = np.ndarray  # node numbers, in the shape of the array they stand for
 
-ELEMENTWISE = frozenset(
-    "abs acos acosh and asin asinh atan atan2 atanh cbrt ceil clamp convert_element_type cos cosh digamma div eq erf "
-    "erf_inv erfc exp exp2 expm1 floor ge gt integer_pow is_finite le lgamma log log1p logistic lt max min ne "
-    "nextafter not or pow rem round rsqrt select_n sign sin sinh sqrt square tan tanh xor".split()
-)
 # Operations that only move elements, with the operands that hold data, not indices (None: all of them).
 MOVEMENT: dict[str, tuple[int, ...] | None] = {
     "broadcast_in_dim": (0,),
@@ -46,20 +42,6 @@ MOVEMENT: dict[str, tuple[int, ...] | None] = {
     "squeeze": (0,),
     "transpose": (0,),
     "unstack": (0,),
-}
-REDUCTIONS: dict[str, tuple[Callable[[Scalar, Scalar], Scalar], Scalar]] = {
-    "reduce_sum": (add, 0.0),
-    "reduce_prod": (multiply, 1.0),
-}
-ARITHMETIC: dict[str, Callable[..., Scalar]] = {
-    "add": add,
-    "add_any": add,
-    "sub": lambda a, b: (
-        a - b if not any(is_known(s) and s == 0 for s in (a, b)) else add(a, multiply(-1.0, b))
-    ),
-    "mul": multiply,
-    "neg": lambda a: multiply(-1.0, a),
-    "stop_gradient": lambda a: a,
 }
 CALLS = ("jaxpr", "call_jaxpr", "fun_jaxpr")  # parameters that hold what is called
 LOOPS = ("scan", "while", "cond")  # operations with such parameters that are no calls
@@ -130,7 +112,7 @@ class _Walk:
         if name in ARITHMETIC:
             return [self.each(name, ARITHMETIC[name], operands)]
         if name in ELEMENTWISE:
-            return [self.each((name, str(params)), lambda *scalars: _bind(equation, scalars), operands)]
+            return [self.each((name, str(params)), lambda *scalars: bind(equation, scalars), operands)]
         if name in REDUCTIONS:
             return [self.reduced(name, operands[0], params["axes"])]
         if name == "dot_general":
@@ -226,43 +208,7 @@ class _Walk:
         """The array of the nodes."""
         if self.all_known(nodes):
             return np.array(self.scalars(nodes), aval.dtype).reshape(nodes.shape)
-        return jnp.stack([_array(s, aval.dtype) for s in self.scalars(nodes)]).reshape(nodes.shape)
-
-
-def _bind(equation: Any, scalars: Sequence[Scalar]) -> Scalar:
-    """One elementwise operation on scalars, folded where it can be."""
-    folded = _folded(equation.primitive.name, scalars, equation.params)
-    if folded is not None:
-        return folded
-    arrays = [_array(s, atom.aval.dtype) for s, atom in zip(scalars, equation.invars, strict=True)]
-    if not all(map(is_known, scalars)):
-        return equation.primitive.bind(*arrays, **equation.params)
-    with jax.ensure_compile_time_eval():
-        return equation.primitive.bind(*arrays, **equation.params).item()
-
-
-def _folded(name: str, scalars: Sequence[Scalar], params: dict) -> Scalar | None:
-    """The result where it needs less than the operation; None otherwise."""
-    first, known = scalars[0], is_known(scalars[0])
-    if name == "convert_element_type" and not known and first.dtype == params["new_dtype"]:
-        return first
-    if name == "div" and known and first == 0:
-        return 0.0
-    if name == "div" and not known and is_known(scalars[1]) and math.frexp(scalars[1])[0] in (-0.5, 0.5):
-        return multiply(1.0 / scalars[1], first)  # a power of two, so exact
-    if name == "integer_pow" and not known and params["y"] in (1, 2, 3):
-        return {1: first, 2: first * first, 3: first * first * first}[params["y"]]
-    if name == "square" and not known:
-        return first * first
-    if name == "select_n" and known:
-        return scalars[1 + int(first)]
-    if name == "select_n" and all(is_known(case) and case == scalars[1] for case in scalars[1:]):
-        return scalars[1]
-    return None
-
-
-def _array(scalar: Scalar, dtype: Any) -> Any:
-    return np.asarray(scalar, dtype) if is_known(scalar) else jnp.asarray(scalar, dtype)
+        return jnp.stack([array(s, aval.dtype) for s in self.scalars(nodes)]).reshape(nodes.shape)
 
 
 def _listed(results: Any) -> Sequence[Any]:
