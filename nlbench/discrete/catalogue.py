@@ -96,17 +96,17 @@ def _row(says: str, source: str, order: int, update: str, options: type[Options]
 
 
 ROWS: dict[str, Row] = {
-    "kalman": _row("the Kalman filter, for linear systems only", KALMAN, 1, "linearised"),
-    "ekf": _row("Kalman filter linearised at its own estimate", f"{ATHANS}, 48-52", 1, "linearised"),
-    "linearised-kalman": _row("another name of ekf", f"{ATHANS}, 48-52", 1, "linearised"),
+    "kalman": _row("the Kalman filter, for linear systems only", KALMAN, 1, "kalman"),
+    "ekf": _row("Kalman filter linearised at its own estimate", f"{ATHANS}, 48-52", 1, "kalman"),
+    "linearised-kalman": _row("another name of ekf", f"{ATHANS}, 48-52", 1, "kalman"),
     "iekf": _row(
         "EKF whose update iterates to the most probable state", "Bell and Cathey 1993", 1, "iterated",
         IteratedOptions,
     ),
-    "sof": _row("second-order mean, EKF covariance, with noise Hessians", f"{ATHANS}, 53-59", 2, "athans"),
+    "sof": _row("second-order mean, EKF covariance, with noise Hessians", f"{ATHANS}, 53-59", 2, "sof"),
     "sof-gaussian": _row(
         "second order with the covariance of a Gaussian, cross Hessians included",
-        "Athans, Wishner and Bertolini 1968", 2, "gaussian",
+        "Athans, Wishner and Bertolini 1968", 2, "sof",
     ),
     "truncated": _row(
         "truncated second order, corrected, with state-dependent noise", f"{HENRIKSEN}, 18-22", 2, "truncated"
@@ -124,14 +124,14 @@ ROWS: dict[str, Row] = {
         QuadratureOptions,
     ),
     "ukf": _row(
-        "unscented Kalman filter", "Julier and Uhlmann 1997", 2, "sigma-point", UnscentedOptions
+        "unscented Kalman filter", "Julier and Uhlmann 1997", 2, "sigma_point", UnscentedOptions
     ),
-    "ckf": _row("cubature Kalman filter", "Arasaratnam and Haykin 2009", 2, "sigma-point"),
+    "ckf": _row("cubature Kalman filter", "Arasaratnam and Haykin 2009", 2, "sigma_point"),
     "ghkf": _row(
-        "Gauss-Hermite Kalman filter", "Ito and Xiong 2000", 2, "sigma-point", QuadratureOptions
+        "Gauss-Hermite Kalman filter", "Ito and Xiong 2000", 2, "sigma_point", QuadratureOptions
     ),
     "gaussian-sum": _row(
-        "bank of EKFs or second-order filters, near ones merged", "Alspach and Sorenson 1972", 2, "mixture",
+        "bank of EKFs or second-order filters, near ones merged", "Alspach and Sorenson 1972", 2, "gaussian_sum",
         MixtureOptions,
     ),
     "ensemble": _row(
@@ -139,7 +139,7 @@ ROWS: dict[str, Row] = {
         "ensemble", EnsembleOptions,
     ),
     "bootstrap": _row(
-        "bootstrap particle filter, systematic resampling", "Gordon, Salmond and Smith 1993", 0, "particles",
+        "bootstrap particle filter, systematic resampling", "Gordon, Salmond and Smith 1993", 0, "bootstrap",
         ParticleOptions,
     ),
 }  # fmt: skip

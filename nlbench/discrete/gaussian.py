@@ -62,6 +62,7 @@ def build(
         integrate=clock.integrate,
         components=components,
         angle=(lambda state: sightings.angle(state.mean)) if sightings else None,
+        limiter=seen.limiter,
     )
 
 

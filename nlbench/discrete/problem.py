@@ -42,7 +42,7 @@ def observation(system: System | DiscreteSystem, options: Any) -> Observation:
     """y = h(t, x, v); for a system in continuous time h(t, x) + v."""
     R = jnp.asarray(system.measurement_cov, float)
     if isinstance(system, DiscreteSystem):
-        observe = system.observe
+        observe = system.observe_with_noise
         function = lambda k, x, v: stacked(observe(k, x, v))  # noqa: E731
         linear = enters_linearly(function, system.states, len(R))
     else:
@@ -93,12 +93,14 @@ def curvatures(function: Callable, n: int, s: int) -> list[tuple[int, ...]]:
     """Indices (i, a, b) of the second derivatives of function(t, x, w) in (x, w) that are not zero by structure."""
     found: list[tuple[int, ...]] = []
 
-    def second(z: Any) -> None:
-        taylor = expand(lambda t, z: function(t, z[:n], z[n:]), 0.0, [z[i] for i in range(n + s)], 2)
+    def second(
+        t: Any, z: Any
+    ) -> None:  # at a time that is not known, so that no zero of one time passes for all
+        taylor = expand(lambda t, z: function(t, z[:n], z[n:]), t, [z[i] for i in range(n + s)], 2)
         assert taylor.second is not None
         found.extend(taylor.second.entries)
 
-    jax.eval_shape(second, jnp.zeros(n + s))
+    jax.eval_shape(second, jnp.zeros(()), jnp.zeros(n + s))
     return found
 
 

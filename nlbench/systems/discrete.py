@@ -13,12 +13,21 @@ if TYPE_CHECKING:
 Function = Callable[..., Any]
 
 
+def step_index(k: Any) -> Any:
+    """k as an integer, by which a system may look things up, also where a caller has it as a float."""
+    if isinstance(k, (int, float)):
+        return round(k)
+    import jax.numpy as jnp
+
+    return k if jnp.issubdtype(k.dtype, jnp.integer) else jnp.round(k).astype(int)
+
+
 @dataclass(frozen=True)
 class DiscreteSystem:
     """A system x(k+1) = f(k, x(k), w), y(k) = h(k, x(k), v), with w ~ N(0, Q) and v ~ N(0, R) independent.
 
-    Time is the step index k: `predict` from k to k + 1 applies the transition once. Additive noise, x + w, and
-    state-dependent noise, G(x) w, are special cases. Shapes are those of one trajectory: n states, m measurements,
+    Time is the step index k, an integer: `predict` from k to k + 1 applies the transition once. Additive noise, x + w,
+    and state-dependent noise, G(x) w, are special cases. Shapes are those of one trajectory: n states, m measurements,
     s process noises, q measurement noises.
 
     transition: (k, x, w) -> (n,). observe: (k, x, v) -> (m,).
@@ -79,7 +88,12 @@ class DiscreteSystem:
 
     def transition_with_inputs(self, k: Any, x: Any, w: Any) -> Any:
         """f(k, x, w), the known inputs u(k) put in: (n,)."""
+        k = step_index(k)
         return self.transition(k, x, w) if self.inputs is None else self.transition(k, x, w, self.inputs(k))
+
+    def observe_with_noise(self, k: Any, x: Any, v: Any) -> Any:
+        """h(k, x, v): (m,), or a tuple of m scalars."""
+        return self.observe(step_index(k), x, v)
 
     def innovation(self, y: Any, h: Any) -> Any:
         """y - h, or what the system puts in its place: (m,)."""

@@ -9,7 +9,10 @@ the source pairs them as above.
 
 It is in the benchmark because eight filters were compared on it, in single runs and means over ten, and because such
 noise leaves them little to tell apart: at sigma_w^2 = 10 the data hold almost nothing about x, at .1 they do. What a
-filter assumes may differ from what is true (figures 10-11). Diverged (chosen): an error above 20.
+filter assumes may differ from what is true (figures 10-11). Who ignores the factor dt (section 5.3) takes the variance
+sigma^2/dt of the numbers drawn for the spectral density: at dt = .001 an `assumed_measurement_psd` of 10,000 and an
+`assumed_process_psd` of 1,000 (inferred). Samples (figure 12) come once a `period`, which the source does not give.
+Diverged (chosen): an error above 20.
 """
 
 from __future__ import annotations
@@ -21,9 +24,10 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from nlbench.moments.moments import Moments
-from nlbench.systems.system import Coordinate, System
+from nlbench.systems.system import Coordinate, Sampling, System
 
 SUMMARY = "two scalar systems with continuous measurements (Schwartz 1967, chapter 5)"
+MEASUREMENT = "continuous"
 
 INITIAL_VARIANCE = {"D1": 1.0, "D2": 0.25}
 
@@ -34,6 +38,17 @@ class InitialError(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     sigma: float = Field(description="initial error in standard deviations")
+
+
+class Samples(BaseModel):
+    """What filters see of the measurement when it is sampled."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    mode: Literal["hold", "pulse"] = Field(
+        description="hold: each sample until the next; pulse: over its step, nothing between"
+    )
+    period: float = Field(gt=0.0, description="time from sample to sample, s, a multiple of the step")
 
 
 class Parameters(BaseModel):
@@ -58,6 +73,9 @@ class Parameters(BaseModel):
     )
     assumed_initial_variance: float | None = Field(
         default=None, gt=0.0, description="variance that filters start from"
+    )
+    sampling: Samples | None = Field(
+        default=None, description="filters see samples of the measurement instead of all of it"
     )
     initial_error: InitialError | None = Field(
         default=None, description="a fixed initial error instead of draws"
@@ -85,7 +103,7 @@ def build(parameters: Parameters) -> System:
 def _system(
     parameters: Parameters, process_psd: float, measurement_psd: float, variance: float, **more: Any
 ) -> System:
-    noisy = process_psd > 0.0
+    noisy, samples = process_psd > 0.0, parameters.sampling
     return System(
         drift=_restoring if parameters.dynamics == "D1" else _cubic,
         observe=_OBSERVED[parameters.measurement],
@@ -98,6 +116,7 @@ def _system(
         diverged=_diverged,
         clip=(5.0,),
         step=0.001,
+        sampling=Sampling(samples.period, samples.mode == "hold") if samples else None,
         **more,
     )
 

@@ -20,6 +20,14 @@ class Coordinate(NamedTuple):
     unit: str = ""
 
 
+class Kind(NamedTuple):
+    """What decides which filters a system is for: whether its time is discrete, and whether its measurements are
+    continuous."""
+
+    discrete: bool
+    continuous: bool
+
+
 class Sets(NamedTuple):
     """Initial states drawn together: `transform` maps a set's (size, n) standard normals to its (size, n) states."""
 
@@ -109,6 +117,15 @@ class Sightings(NamedTuple):
         return jnp.asarray(self.marks)[number % len(self.marks)]
 
 
+class Sampling(NamedTuple):
+    """What is left of continuous measurements where they are sampled: one in a `period`, from time 0 on, with the noise
+    of one step. Filters take it as held until the next, or else as a pulse of one step with nothing between.
+    """
+
+    period: float
+    held: bool
+
+
 class LateError(NamedTuple):
     """A run diverges at its end if an error was large for long: the root mean square over the last `window` of the
     norm of the errors `members` above `bound`."""
@@ -143,6 +160,7 @@ class System:
     inputs: t -> known inputs u(t), then drift takes (t, x, u).
     step: default integration step; None means a tenth of the interval.
     interval: time between measurements; None means that nothing is measured, or only by sightings.
+    sampling: how continuous measurements are sampled; None means that filters see all of them.
     sightings: measurements that wait for an angle; `observe` then serves where no sighting's number is given.
     exact: what the exact reference is made of, where there is one.
     norms: named norms of the errors, each with the coordinates that it joins.
@@ -167,8 +185,9 @@ class System:
     inputs: Function | None = None
     step: float | None = None
     interval: float | None = None
+    sampling: Sampling | None = None
     sightings: Sightings | None = None
-    exact: InitialGrid | KalmanBank | InitialPosterior | None = None
+    exact: Any = None
     norms: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     @property
@@ -210,3 +229,9 @@ class System:
     def innovation(self, y: Any, h: Any) -> Any:
         """y - h, or what the system puts in its place: (m,)."""
         return y - h if self.residual is None else self.residual(y, h)
+
+
+def kind(system: Any) -> Kind:
+    """The kind of a `System` or `DiscreteSystem`."""
+    timed = isinstance(system, System)
+    return Kind(discrete=not timed, continuous=timed and system.measurement == "continuous")

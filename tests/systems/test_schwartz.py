@@ -87,6 +87,23 @@ def test_a_fixed_initial_error_is_in_standard_deviations_of_the_truth():
         np.testing.assert_array_equal(system.sample(jax.random.key(1)), [-1.0])
 
 
+@pytest.mark.parametrize(("mode", "held"), [("hold", True), ("pulse", False)])
+def test_filters_may_see_samples_while_the_truth_stays_what_it_was(mode, held):
+    system = build(sampling={"mode": mode, "period": 0.1})
+    assert tuple(system.sampling) == (0.1, held)
+    np.testing.assert_array_equal(system.measurement_cov, build().measurement_cov)
+    assert build().sampling is None
+
+
+def test_a_filter_may_ignore_the_factor_dt():
+    """It takes the variance of the numbers drawn, density over step, for the density."""
+    given = {"assumed_process_psd": 1.0 / 0.001, "assumed_measurement_psd": 10.0 / 0.001}
+    f = nb.filters.build("schwartz-2", build(dynamics="D2", measurement="M22", **given))
+    rates = f.rates(f.init(nb.Moments([0.0], [[2.0]])), 0.0, np.array([5.0]))
+    np.testing.assert_allclose(rates.mean, [2.0 / 10_000 * 5.0], rtol=1e-13)
+    np.testing.assert_allclose(rates.cov, [[1000.0 - 2.0**2 / 10_000]], rtol=1e-13)
+
+
 @pytest.mark.parametrize(
     "bad",
     [
@@ -97,6 +114,8 @@ def test_a_fixed_initial_error_is_in_standard_deviations_of_the_truth():
         {"assumed_measurement_psd": 0.0},
         {"initial_variance": 0.0},
         {"interval": 0.1},
+        {"sampling": {"mode": "hold"}},
+        {"sampling": {"mode": "hold", "period": 0.0}},
     ],
 )
 def test_parameters_out_of_range_or_unknown_are_refused(bad):
