@@ -120,6 +120,7 @@ def _problem(workload: Workload) -> Any:
                 "output": own.interval,
             },
             "monte_carlo": {"runs": workload.trajectories, "seed": SEED},
+            "scores": False,  # the C program has none
         }
     )
     return problem.make(stated, own)

@@ -12,7 +12,7 @@ class Problem(NamedTuple):
     """One thing wrong with an experiment: where it stands, which key it concerns, what is allowed.
 
     `file` is the file as the user named it, or the option (`--set time.step`) that brought the value; `line`
-    and `column` count from 1 and are None for an option.
+    and `column` count from 1 and are None for an option; `column` is where a line is wrong as a whole.
     """
 
     message: str
@@ -23,7 +23,7 @@ class Problem(NamedTuple):
     source_line: str | None = None
 
     def __str__(self) -> str:
-        place = self.file if self.line is None else f"{self.file}:{self.line}:{self.column}"
+        place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
         path = "" if self.line is None and self.file.endswith(f" {self.path}") else self.path
         head = ": ".join(part for part in (place, path, self.message) if part)
         if not self.source_line or self.column is None:

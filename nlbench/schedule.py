@@ -9,7 +9,8 @@ from typing import NamedTuple
 class Schedule(NamedTuple):
     """A segment is the longest stretch of steps without a measurement or an output inside.
 
-    step: integration step. segment_steps: steps in a segment. segments: number of segments.
+    step: integration step; in discrete time 1, an integer, as then all times are: the numbers of the steps.
+    segment_steps: steps in a segment. segments: number of segments.
     measured_every: segments between measurements (0: none). output_every: segments between outputs.
     sightings: how many measurements can be made that wait for an angle, at the end of any segment (0: none).
     continuous: whether measurements are continuous: every step is a segment, and has one at its start.

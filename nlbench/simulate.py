@@ -2,7 +2,7 @@
 
 Every filter of an experiment sees the same truth and noise, whatever the block, thread, device or filter: that is what
 pairs their errors. Drifts without noise are integrated by the staged RK4 of `moments.integrate`; with process noise the
-step is diffrax's Euler (Ito) on increments drawn beforehand.
+step is diffrax's Euler (Ito) on increments drawn beforehand. In discrete time a step is the transition.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 
 from nlbench.algebra import Tensor, expand
 from nlbench.moments.integrate import fixed_rk4
+from nlbench.systems.discrete import DiscreteSystem
 from nlbench.systems.system import Sets
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def trajectory_key(key: Any, high: Any, low: Any, purpose: int) -> Any:
     return jax.random.fold_in(jax.random.fold_in(jax.random.fold_in(key, high), low), purpose)
 
 
-def initial_state(system: System, key: Any, trajectory: Trajectory) -> Any:
+def initial_state(system: System | DiscreteSystem, key: Any, trajectory: Trajectory) -> Any:
     """x(0), (n,): as the system samples it, or normal with its initial moments."""
     if isinstance(system.sample, Sets):
         lows = trajectory.first_low + jnp.arange(system.sample.size, dtype=jnp.uint32)
@@ -57,7 +58,7 @@ def initial_state(system: System, key: Any, trajectory: Trajectory) -> Any:
         return jnp.asarray(system.sample.transform(normals))[trajectory.member]
     own = trajectory_key(key, trajectory.high, trajectory.low, INITIAL)
     if system.sample is not None:
-        return system.sample(own)
+        return jnp.asarray(system.sample(own), float)
     return jnp.asarray(system.initial.mean, float) + root(system.initial.cov) @ jax.random.normal(
         own, (system.states,)
     )
@@ -74,7 +75,9 @@ class Simulated(NamedTuple):
     key: Any
 
 
-def simulate(system: System, schedule: Schedule, key: Any, trajectory: Trajectory) -> Simulated:
+def simulate(
+    system: System | DiscreteSystem, schedule: Schedule, key: Any, trajectory: Trajectory
+) -> Simulated:
     """The truth, and what is measured of it or will be."""
     start = initial_state(system, key, trajectory)
     own = trajectory_key(key, trajectory.high, trajectory.low, PROCESS)
@@ -84,21 +87,45 @@ def simulate(system: System, schedule: Schedule, key: Any, trajectory: Trajector
     variance = np.asarray(system.measurement_cov, float)
     if schedule.continuous:  # white noise of that spectral density, as a sample held over a step
         variance = variance / schedule.step
-    noise = jax.random.normal(own, (count, system.measurements)) @ root(variance)
+    noise = jax.random.normal(own, (count, len(variance))) @ root(variance)
     drawing = jax.random.key_data(trajectory_key(key, trajectory.high, trajectory.low, FILTER))
     if not schedule.measurements:
-        return Simulated(states, noise[:0], noise, drawing)
+        return Simulated(states, jnp.zeros((0, system.measurements)), noise, drawing)
     times = jnp.asarray(schedule.measurement_times)
     every = schedule.measured_every
     measured = states[:-1] if schedule.continuous else states[every::every]
-    h = jax.vmap(lambda t, x: _stacked(system.observe(t, x)))(times, measured)
-    return Simulated(states, h + noise, noise[:0], drawing)
+    y = jax.vmap(lambda t, x, v: _measured(system, t, x, v))(times, measured, noise)
+    return Simulated(states, y, noise[:0], drawing)
 
 
-def path(system: System, schedule: Schedule, key: Any, start: Any) -> Any:
+def _measured(system: System | DiscreteSystem, t: Any, x: Any, v: Any) -> Any:
+    """What is measured at (t, x) with noise v, (m,)."""
+    if isinstance(system, DiscreteSystem):
+        return _stacked(system.observe_with_noise(t, x, v))
+    return _stacked(system.observe(t, x)) + v
+
+
+def path(system: System | DiscreteSystem, schedule: Schedule, key: Any, start: Any) -> Any:
     """States at the ends of the segments, (segments, n), from `start`."""
+    if isinstance(system, DiscreteSystem):
+        return _transitions(system, schedule, key, start)
     advance = _deterministic if system.diffusion is None else _stochastic
     return advance(system, schedule, key, start)
+
+
+def _transitions(system: DiscreteSystem, schedule: Schedule, key: Any, start: Any) -> Any:
+    steps = (schedule.segments, schedule.segment_steps)
+    noise = jax.random.normal(key, (*steps, system.noises)) @ root(system.process_cov)
+
+    def step(x: Any, given: tuple[Any, Any]) -> tuple[Any, None]:
+        return _stacked(system.transition_with_inputs(given[0], x, given[1])), None
+
+    def segment(x: Any, given: tuple[Any, Any]) -> tuple[Any, Any]:
+        k, noise = given
+        x = jax.lax.scan(step, x, (k + jnp.arange(schedule.segment_steps), noise))[0]
+        return x, x
+
+    return jax.lax.scan(segment, start, (jnp.asarray(schedule.segment_times[:-1]), noise))[1]
 
 
 def _deterministic(system: System, schedule: Schedule, key: Any, start: Any) -> Any:

@@ -144,6 +144,23 @@ def divergence(factors: Mapping[str, float], diverged: Mapping[str, int], runs: 
     )
 
 
+def consistency(factors: Mapping[str, float], runs: int) -> pd.DataFrame:
+    """NEES of two coordinates, twice the factor; NIS of one entry, one for all: selected where the guard fires."""
+    rows: list[tuple] = []
+    half = 1.96 * (2 / runs) ** 0.5
+    for label, factor in factors.items():
+        for time in [*map(str, TIMES), "all"]:
+            scores = [("nis", 1.0, 1)] if time == "all" else [("nees", 2 * factor, 2), ("nis", 1.0, 1)]
+            for score, value, dof in scores:
+                reach = half * dof**0.5
+                known = score == "nees" or "guarded" not in label
+                low, high = (dof - reach, dof + reach) if known else (np.nan, np.nan)
+                inside = low <= value <= high if known else None
+                rows.append((label, time, score, value, reach / 1.96, low, high, dof, runs, inside))
+    columns = ["filter", "time", "score", "value", "stderr", "low", "high", "dof", "n", "consistent"]
+    return pd.DataFrame(rows, columns=columns).astype({"consistent": "boolean"})
+
+
 def claims() -> pd.DataFrame:
     """One claim of each verdict."""
     rows = [

@@ -46,22 +46,34 @@ def show(
 
 
 def _registry(what: What) -> tuple[Any, Any, Any]:
-    """Names, one-line summary and pydantic model of the parameters."""
+    """Names, one-line summary, and the pydantic model of the parameters for each kind of system, by the kind's name."""
     from nlbench import systems
     from nlbench.filters import catalogue
 
+    def of_system(name: str) -> dict[str, type[BaseModel]]:
+        model = systems.parameters(name)
+        return {catalogue.KINDS[systems.kind(name, model().model_dump())]: model}
+
+    def of_filter(name: str) -> dict[str, type[BaseModel]]:
+        return {catalogue.KINDS[kind]: catalogue.options(name, *kind) for kind in catalogue.takes(name)}
+
     if what is What.systems:
-        return systems.available(), systems.summary, systems.parameters
-    return catalogue.available(), catalogue.summary, catalogue.options
+        return systems.available(), systems.summary, of_system
+    return catalogue.available(), catalogue.summary, of_filter
 
 
 def _all(what: What, json: bool) -> None:
-    names, summary, _ = _registry(what)
-    entries = [(name, summary(name)) for name in names]
+    names, summary, models = _registry(what)
+    entries = [{"name": name, "summary": summary(name), "kinds": list(models(name))} for name in names]
     if json:
-        output.as_json([{"name": name, "summary": text} for name, text in entries])
+        output.as_json(entries)
         return
-    output.definitions(entries)
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for each in entries:
+        groups.setdefault(", ".join(each["kinds"]), []).append((each["name"], each["summary"]))
+    for kinds, group in groups.items():
+        print(output.styled(kinds if what is What.systems else f"for {kinds}", "bold"))
+        output.definitions(group)
     word = "parameters" if what is What.systems else "options"
     output.next_step(f"nlbench list {what} {names[0]}", f"shows the {word} of one of them")
 
@@ -71,19 +83,36 @@ def _one(what: What, name: str, json: bool) -> None:
 
     if what is What.experiments:
         raise ConfigError("list experiments takes no name; nlbench validate CONFIG shows one")
-    names, summary, model = _registry(what)
+    names, summary, models = _registry(what)
     if name not in names:
         raise ConfigError(f"unknown {what.removesuffix('s')} '{name}'{suggestion(name, names)}")
-    fields = list(_fields(model(name)))
+    fields = {kind: list(_fields(model)) for kind, model in models(name).items()}
     if json:
-        output.as_json({"name": name, "summary": summary(name), "parameters": fields})
+        first, *others = fields
+        apart = {kind: fields[kind] for kind in others if fields[kind] != fields[first]}
+        said = {"name": name, "summary": summary(name), "kinds": list(fields)}
+        output.as_json({**said, "parameters": fields[first], "parameters_of_other_kinds": apart})
         return
-    print(f"{name}: {summary(name)}\n")
-    output.definitions((each["name"], _described(each)) for each in fields)
+    print(f"{name}: {summary(name)}")
+    for shown, kinds in _alike(fields):
+        print(f"\n{', '.join(kinds)}")
+        output.definitions((each["name"], _described(each)) for each in shown)
     entry = f"system: {{name: {name}}}" if what is What.systems else f"filters: [{name}]"
     output.next_step(
         f"write '{entry}' into an experiment file", "parameters go beside the name: {name: ..., key: value}"
     )
+
+
+def _alike(fields: dict[str, list[dict[str, Any]]]) -> list[tuple[list[dict[str, Any]], list[str]]]:
+    """Each list of fields, with the kinds of systems that have it."""
+    found: list[tuple[list[dict[str, Any]], list[str]]] = []
+    for kind, each in fields.items():
+        kinds = next((kinds for known, kinds in found if known == each), None)
+        if kinds is None:
+            found.append((each, [kind]))
+        else:
+            kinds.append(kind)
+    return found
 
 
 def _fields(model: type[BaseModel]) -> Any:

@@ -60,15 +60,17 @@ def assemble(raw: Mapping[str, Any], question: str = "") -> tuple[Experiment | N
     name, system = _system(raw, findings)
     parts["system"] = system
     parts["truth"] = _believed(name, system, raw.get("truth", {}), ("truth",), findings)
+    discrete, _ = _kind(name, system, parts["truth"])
     entries = _entries(raw, findings)
     filters = parts["filters"] = [
         _filter(each, ("filters", index), name, system, findings) for index, each in enumerate(entries)
     ]
     labels = [_label(each) for each in entries] + ([head.reference] if head and head.reference else [])
-    time = parts["time"] = _time(raw, system, findings)
+    time = parts["time"] = _time(raw, system, discrete, findings)
     claims = parts["claims"] = _claims(raw, findings)
     reports = consistency.report_times(head, time)
     findings += consistency.times(time, reports, system, filters, parts["truth"])
+    findings += consistency.steps(filters) if discrete else []
     findings += consistency.labels(labels, len(entries))
     findings += consistency.claims(claims, labels, reports)
     findings += consistency.traces(head, parts["monte_carlo"])
@@ -121,6 +123,15 @@ def _system(raw: Mapping[str, Any], findings: list[Finding]) -> tuple[str | None
         return None, None
     parameters = _kept(validated(systems.parameters(name), given, ("system",)), findings)
     return name, SystemSpec(name=name, parameters=parameters.model_dump(mode="json")) if parameters else None
+
+
+def _kind(name: str | None, system: SystemSpec | None, changed: dict[str, Any]) -> tuple[bool, bool]:
+    """What kind the system is with some parameters changed, as `catalogue.KINDS`; the first where it is not known."""
+    from nlbench import systems
+
+    if name is None:
+        return next(iter(catalogue.KINDS))
+    return systems.kind(name, {**(system.parameters if system else {}), **changed})
 
 
 def _entry(given: Any) -> Any:
@@ -185,14 +196,16 @@ def _filter(
     named = _kept(
         validated(Named, {key: given[key] for key in Named.model_fields if key in given}, path), findings
     )
-    name, options = given["name"], None
-    if name in catalogue.available():
-        own = {key: value for key, value in given.items() if key not in Named.model_fields}
-        options = _kept(validated(catalogue.options(name), own, path), findings)
-    else:
-        at = (*path, "name")
-        findings.append(Finding(at, f"unknown filter '{name}'{suggestion(name, catalogue.available())}"))
+    name, options, at = given["name"], None, (*path, "name")
     model = _believed(system_name, system, given.get("model") or {}, (*path, "model"), findings)
+    kind = _kind(system_name, system, model)
+    if name not in catalogue.available():
+        findings.append(Finding(at, f"unknown filter '{name}'{suggestion(name, catalogue.available())}"))
+    elif refused := catalogue.refusal(name, *kind):
+        findings.append(Finding(at, f"'{name}' {refused}"))
+    else:
+        own = {key: value for key, value in given.items() if key not in Named.model_fields}
+        options = _kept(validated(catalogue.options(name, *kind), own, path), findings)
     initial, wrong = _initial(given.get("initial") or {}, (*path, "initial"))
     findings += wrong
     if len(findings) > before or named is None or options is None:
@@ -206,15 +219,23 @@ def _initial(given: Any, path: Path) -> tuple[dict[str, Any], list[Finding]]:
     return (initial.moments() if initial else {}), findings
 
 
-def _time(raw: Mapping[str, Any], system: SystemSpec | None, findings: list[Finding]) -> TimeSpec | None:
+def _time(
+    raw: Mapping[str, Any], system: SystemSpec | None, discrete: bool, findings: list[Finding]
+) -> TimeSpec | None:
     """The times; what the file leaves out follows from the system's interval between measurements."""
     given = raw.get("time", {})
     if not isinstance(given, dict):
         return _kept(validated(TimeSpec, given, ("time",)), findings)
-    defaults = consistency.default_times(system, given) if system else {}
+    defaults = consistency.default_times(system, given, discrete) if system else {}
     if system is None and any(key not in given for key in TimeSpec.model_fields):
         return None
-    return _kept(validated(TimeSpec, {**defaults, **given}, ("time",)), findings)
+    time = _kept(validated(TimeSpec, {**defaults, **given}, ("time",)), findings)
+    if not discrete or time is None or time.step == 1:
+        return time
+    findings.append(
+        Finding(("time", "step"), f"time is discrete, so a step is 1, found {time.step:g}; leave it out")
+    )
+    return time.model_copy(update={"step": 1.0})
 
 
 def _claims(raw: Mapping[str, Any], findings: list[Finding]) -> list[Claim | None]:

@@ -14,12 +14,17 @@ MOST_OUTPUTS = 100_000
 MOST_STEPS = 10**9
 
 
-def default_times(system: SystemSpec, given: dict[str, Any]) -> dict[str, float]:
-    """Twenty measurements, a statistic at each and ten steps between, unless the file says otherwise."""
-    interval = system.parameters.get("interval") or given.get("output") or given.get("end", 1.0) / 20
+def default_times(system: SystemSpec, given: dict[str, Any], discrete: bool) -> dict[str, float]:
+    """Twenty measurements, a statistic at each and ten steps between, unless the file says otherwise; in discrete time
+    steps are given, and where no interval is, there is a statistic at each.
+    """
+    interval = system.parameters.get("interval") or given.get("output")
+    end = given.get("end", 1.0)
+    if not interval and isinstance(end, (int, float)):
+        interval = 1 if discrete else end / 20
     if not isinstance(interval, (int, float)) or not interval > 0:
         return {}
-    return {"end": 20 * interval, "output": interval, "step": interval / 10}
+    return {"end": 20 * interval, "output": interval, "step": 1 if discrete else interval / 10}
 
 
 def report_times(head: Head | None, time: TimeSpec | None) -> list[float] | None:
@@ -70,6 +75,15 @@ def times(
         if step is not None:
             findings += _multiple(("time", "output"), time.output, f"filters.{index}.step", step)
     return findings
+
+
+def steps(filters: Sequence[FilterSpec | None]) -> list[Finding]:
+    """Where time is discrete, filters do not choose the step."""
+    return [
+        Finding(("filters", index, "step"), "time is discrete, nothing is integrated; leave the step out")
+        for index, spec in enumerate(filters)
+        if spec and spec.options.get("step") is not None
+    ]
 
 
 def labels(labels: Sequence[str | None], filters: int) -> list[Finding]:

@@ -26,8 +26,14 @@ Statistic = Literal[
     "third_actual",
     "nees",
     "coverage_95",
+    "nis",
+    "log_likelihood",
 ]
-Figure = Literal["rms", "rms_clipped", "mean_error", "variance", "third_moment", "divergence", "trace"]
+Figure = Literal[
+    "rms", "rms_clipped", "mean_error", "variance", "third_moment", "nees", "divergence", "trace"
+]
+
+Bound = Literal["cramer-rao"]
 
 
 def _path_like(name: str) -> str:
@@ -72,6 +78,13 @@ class Head(Section):
         default_factory=list,
         max_length=32,
         description="numbers of runs, from 0, whose errors are saved at all output times and drawn",
+    )
+    bounds: list[Bound] = Field(
+        default_factory=list, max_length=1, description="bounds on the errors of any filter to compute"
+    )
+    scores: bool = Field(
+        default=True,
+        description="whether filters are scored by how they foretold the measurements: nis and log_likelihood",
     )
 
 
@@ -208,6 +221,8 @@ class Experiment(Section):
     limits: Limits = Limits()
     figures: list[Figure] | None = None
     traces: list[RunNumber] = Field(default_factory=list)
+    bounds: list[Bound] = Field(default_factory=list)
+    scores: bool = True
 
     @property
     def labels(self) -> tuple[str, ...]:

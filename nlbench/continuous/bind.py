@@ -16,6 +16,7 @@ import jax.numpy as jnp
 from nlbench.algebra import Tensor, einsum, log_determinant
 from nlbench.continuous import stepping
 from nlbench.continuous.families import State, equations
+from nlbench.continuous.sampling import sampled
 from nlbench.errors import ConfigError
 from nlbench.filters.filter import Filter, UpdateInfo
 from nlbench.moments.equations import fourth_moment_rate
@@ -31,13 +32,15 @@ if TYPE_CHECKING:
 def bind(name: str, row: Row, system: System, options: Options) -> Filter:
     """The filter of a catalogue row, bound to a system.
 
-    Raises `ConfigError` where measurements are discrete, no step is known, or printed equations do not fit.
+    Raises `ConfigError` where no step is known, samples do not fall on steps, or printed
+    equations do not fit.
     """
-    if system.measurement != "continuous":
-        raise ConfigError(f"{name}: takes continuous measurements, and the system's are at discrete times")
     h = options.step or system.default_step
     if h is None:
         raise ConfigError(f"{name}: needs the length of its steps: give `step`, here or of the system")
+    if system.sampling is not None:
+        gaps = options.model_copy(update={"missing": True})
+        return sampled(name, system, h, lambda system: bind(name, row, system, gaps))
     equation = equations(name, row, system, options)
     advance = stepping.build(options.integrator)
 

@@ -48,7 +48,7 @@ def equations(name: str, row: Row, system: System, options: Options) -> Equation
 
 
 def _kushner(name: str, row: Row, system: System, options: KushnerOptions) -> Equations:
-    order = row.order
+    order, h = row.order, options.step or system.default_step
     printed = {"printed": kushner_printed.general, "printed-scalar": kushner_printed.scalar}.get(
         options.equations
     )
@@ -64,7 +64,9 @@ def _kushner(name: str, row: Row, system: System, options: KushnerOptions) -> Eq
         found = rates(t, state, sensed)
         if found.fourth is None or sensed is None:
             return found
-        return found._replace(fourth=found.fourth - kushner.ito_term(state, sensed))
+        if printed is None:
+            return found._replace(fourth=found.fourth - kushner.ito_term(state, sensed))
+        return found._replace(fourth=found.fourth - kushner_printed.euler_term(found, h))
 
     return _of_components(system, options, 2, _curved, rates, ito_rates)
 

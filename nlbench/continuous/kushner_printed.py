@@ -6,15 +6,23 @@ General form (4.67), (4.68), which lacks what the moving mean takes away, and cl
 Scalar form of chapter 7: (7.5) is right, (7.6) has the error of (1), and has lost from mu4' all that Gamma brings save
 -4 b c of order 4; with Omega_ij = b_i c_j and linear h,
   (3) mu4_ijkl' -= 6{Omega_ij P_kl} + u 6{P_ij c_kl}
-Since the other rates are right, k4' = mu4' - 6{P P'} differs by as much as mu4'.
+Since the other rates are right, k4' = mu4' - 6{P P'} differs by as much as mu4'. The source steps mu4 itself by the
+rectangular rule; as 3{P P} goes to 3{P P} + 6 h {P P'} + 3 h^2 {P' P'} meanwhile, that is for k4 a step with the rate
+  (4) k4' - 3 h {P' P'}
+whose last term has, in the mean over the noise and as h -> 0, the value of (9) of `kushner`.
 """
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from nlbench.algebra import Tensor, einsum, placements
 from nlbench.continuous.kushner import told
 from nlbench.continuous.sensing import Sensed, curved_residual, total, weighted
 from nlbench.moments.moments import Components
+
+if TYPE_CHECKING:
+    from nlbench.algebra.scalars import Scalar
 
 
 def general(order: int, rates: Components, moments: Components, sensed: Sensed) -> Components:
@@ -53,3 +61,8 @@ def scalar(order: int, rates: Components, moments: Components, sensed: Sensed) -
     third = u[0] * placements(3, "ij,k->ijk", P, part.mean)
     fourth = placements(6, "ij,kl->ijkl", omega + u[0] * part.cov, P)  # (3)
     return rates._replace(third=rates.third + third, fourth=rates.fourth - fourth)
+
+
+def euler_term(rates: Components, h: Scalar) -> Tensor:
+    """The last term of (4)."""
+    return h * placements(3, "ij,kl->ijkl", rates.cov, rates.cov)

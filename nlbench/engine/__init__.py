@@ -11,7 +11,7 @@ def run(experiment: Any, out: Any = None, progress: Any = None) -> Any:
     """Run an experiment, or go on with one that was stopped, and return its `Results`.
 
     experiment: an `Experiment`, a path of an experiment file, or a dict with the keys of one, whose `system` may be a
-        `System` of your own.
+        `System` or `DiscreteSystem` of your own.
     out: folder of results (default "results"). progress: called with (runs done, runs in all).
     Raises `ConfigError` before anything is computed, `LockedError` where another process runs the same experiment,
     `EnvironmentFault` for disk and memory, `Interrupted` after Ctrl-C with everything so far saved.
@@ -37,16 +37,18 @@ def replay(experiment: Any, label: str, trajectory: int) -> Any:
 
 def _stated(given: Any) -> tuple[Any, Any]:
     """The experiment, and the user's own system if there is one."""
-    from nlbench import config, runtime
+    from nlbench import config, runtime, systems
+    from nlbench.systems.discrete import DiscreteSystem
+    from nlbench.systems.own import recorded
     from nlbench.systems.system import System
 
     own = None
     if isinstance(given, config.Experiment):
         experiment = given
     elif isinstance(given, dict):
-        if isinstance(given.get("system"), System):
+        if isinstance(given.get("system"), (System, DiscreteSystem)):
             own = given["system"]
-            given = {**given, "system": {"name": "own", "interval": own.interval}}
+            given = {**given, "system": {"name": systems.OWN, **recorded(own)}}
         experiment = config.from_dict(given)
     else:
         experiment = config.load(given)

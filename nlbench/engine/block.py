@@ -108,7 +108,8 @@ def block_tracks(
     """What the filters did on one block, and one lane of it."""
     data = trajectories(problem, seed, lanes)
     states, layout = data.states[:: problem.schedule.output_every], problem.layout
-    moments = [followed(problem, runner, data) for runner in problem.runners]
+    scored = problem.layout.scores and bool(problem.schedule.sightings or problem.schedule.measurements)
+    moments = [followed(problem, runner, data, scored) for runner in problem.runners]
     judged = [
         judge(problem.judged_by, runner.filter.system, layout, states, each.components)
         for runner, each in zip(problem.runners, moments, strict=True)
@@ -127,6 +128,7 @@ def block_tracks(
         diverged=jnp.stack([each.diverged for each in judged]),
         guarded=jnp.stack([each.guarded for each in moments]),
         updates=jnp.stack([each.updates for each in moments]),
+        scores=jax.tree.map(lambda *each: jnp.stack(each), *(each.scores for each in moments)),
     )
     view = View(
         states,
@@ -146,8 +148,8 @@ def trajectories(problem: Problem, seed: tuple[Any, Any], lanes: Trajectory) -> 
     return over_lanes(lambda trajectory: simulate(problem.truth, problem.schedule, key, trajectory))(lanes)
 
 
-def followed(problem: Problem, runner: Runner, data: Simulated) -> Followed:
-    """One filter along the data of a block."""
+def followed(problem: Problem, runner: Runner, data: Simulated, scores: bool = False) -> Followed:
+    """One filter along the data of a block, scored by its measurements if that is asked for."""
     if problem.schedule.sightings:
-        return follow_sightings(problem, runner, data)
-    return follow(runner, problem.schedule, data.measurements, problem.block, data.key)
+        return follow_sightings(problem, runner, data, scores)
+    return follow(runner, problem.schedule, data.measurements, problem.block, data.key, scores)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import statistics
 import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 MOST_BLOCKS = 16
 MOST_STEPS = 500_000  # of all trajectories timed together
+PASS_SECONDS = 0.2  # that one timing of a filter may take, unless a single block takes longer
+FILTER_SECONDS = 2.0  # after which a filter is timed no more
 ROUNDS = 7
 ARITHMETIC = frozenset(
     "abs add atan2 cos div exp expm1 integer_pow log log1p max min mul neg pow rsqrt sin sqrt square sub tan "
@@ -35,8 +38,9 @@ def cost_table(problem: Problem, seed: int) -> pd.DataFrame:
     """`filter, ns_per_step, compile_seconds, operations_per_step, operations_per_update`.
 
     ns_per_step: one core, updates included, for one trajectory and one integration step; medians of interleaved
-    rounds on the measurements of the first blocks. compile_seconds: by the wall clock, while as many filters are
-    compiled as there are threads. operations: scalar arithmetic before XLA shares any of it.
+    rounds on the measurements of the first blocks, fewer blocks and rounds of a filter that takes long.
+    compile_seconds: by the wall clock, while as many filters are compiled as there are threads. operations: scalar
+    arithmetic before XLA shares any of it.
     """
     import pandas as pd
 
@@ -48,14 +52,12 @@ def cost_table(problem: Problem, seed: int) -> pd.DataFrame:
         programs, compile_seconds = zip(
             *pool.map(partial(_compiled, problem, data), problem.runners), strict=True
         )
-    rounds = [[_seconds(program, data) for program in programs] for _ in range(ROUNDS)]
+    seconds = _seconds(programs, data, blocks)
     counted = [operations(problem, runner) for runner in problem.runners]
     return pd.DataFrame(
         {
             "filter": [runner.label for runner in problem.runners],
-            "ns_per_step": [
-                1e9 * statistics.median(times) / (steps * blocks) for times in zip(*rounds, strict=True)
-            ],
+            "ns_per_step": [1e9 * each / steps for each in seconds],
             "compile_seconds": compile_seconds,
             "operations_per_step": [step for step, _ in counted],
             "operations_per_update": [update for _, update in counted],
@@ -66,23 +68,41 @@ def cost_table(problem: Problem, seed: int) -> pd.DataFrame:
 def _compiled(problem: Problem, data: Simulated, runner: Runner) -> tuple[Any, float]:
     """The program of one filter, and how long it took to make."""
     begun = time.perf_counter()
-    program = jax.jit(partial(_alone, problem, runner)).lower(data).compile()
+    program = jax.jit(partial(_alone, problem, runner)).lower(data, np.int32(1)).compile()
     return program, time.perf_counter() - begun
 
 
-def _alone(problem: Problem, runner: Runner, data: Simulated) -> Any:
-    """One filter on the data of some blocks; a sum, so that nothing is left out."""
+def _alone(problem: Problem, runner: Runner, data: Simulated, count: Any) -> Any:
+    """One filter on the data of the first `count` blocks; a sum, so that nothing is left out."""
 
-    def block(data: Simulated) -> Any:
-        return jnp.sum(followed(problem, runner, data).components, axis=(0, 1))
+    def add_block(number: Any, total: Any) -> Any:
+        block = jax.tree.map(lambda leaf: leaf[number], data)
+        return total + jnp.sum(followed(problem, runner, block).components, axis=(0, 1))
 
-    return jax.lax.map(block, data)
+    return jax.lax.fori_loop(0, count, add_block, jnp.zeros(problem.block))
 
 
-def _seconds(program: Any, data: Simulated) -> float:
-    jax.block_until_ready(program(data))  # not timed: it finds another program's data in the caches
+def _seconds(programs: Sequence[Any], data: Simulated, blocks: int) -> list[float]:
+    """Seconds that each program takes for one block: the median of rounds that take turns."""
+    once = [_timed(program, data, 1) for program in programs]
+    counts = [max(1, min(blocks, int(PASS_SECONDS / each))) for each in once]
+    rounds = [
+        min(ROUNDS, int(FILTER_SECONDS / (each * count))) for each, count in zip(once, counts, strict=True)
+    ]
+    found: list[list[float]] = [[] for _ in programs]
+    for number in range(ROUNDS):
+        for times, program, count, most in zip(found, programs, counts, rounds, strict=True):
+            if number < most:
+                times.append(_timed(program, data, count) / count)
+    return [statistics.median(times or [each]) for times, each in zip(found, once, strict=True)]
+
+
+def _timed(program: Any, data: Simulated, count: int) -> float:
+    jax.block_until_ready(
+        program(data, np.int32(1))
+    )  # not timed: it finds another program's data in the caches
     begun = time.perf_counter()
-    jax.block_until_ready(program(data))
+    jax.block_until_ready(program(data, np.int32(count)))
     return time.perf_counter() - begun
 
 
@@ -90,9 +110,9 @@ def operations(problem: Problem, runner: Runner) -> tuple[int, int]:
     """Arithmetic operations of one integration step and of one update, of one trajectory."""
     filter = runner.filter
     state = filter.init(runner.initial)
-    y = jnp.zeros(problem.truth.measurements)
-    step = jax.make_jaxpr(lambda state: filter.integrate(state, 0.0, runner.step, 1))(state)
-    update = jax.make_jaxpr(lambda state, y: filter.update(state, 0.0, y)[0])(state, y)
+    y, start = jnp.zeros(problem.truth.measurements), problem.schedule.segment_times[0]
+    step = jax.make_jaxpr(lambda state: filter.integrate(state, start, runner.step, 1))(state)
+    update = jax.make_jaxpr(lambda state, y: filter.update(state, start, y)[0])(state, y)
     return _count(_needed(step.jaxpr)), _count(_needed(update.jaxpr))
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from nlbench import runtime
 from nlbench.config.schema import SystemSpec
+from nlbench.engine.bounds import bounds_table
 from nlbench.engine.compiled import CAPACITY, Compiled, compile_chunks
 from nlbench.engine.finish import up_to_date, write
 from nlbench.engine.interruption import stop_requests
@@ -23,6 +24,7 @@ from nlbench.statistics.totals import Totals
 
 if TYPE_CHECKING:
     from nlbench.config import Experiment
+    from nlbench.systems.discrete import DiscreteSystem
     from nlbench.systems.system import System
 
 Progress = Callable[[int, int], None]
@@ -30,7 +32,10 @@ SECONDS_BETWEEN_CHECKPOINTS = 5.0
 
 
 def run(
-    experiment: Experiment, own: System | None, out: str | Path, progress: Progress | None = None
+    experiment: Experiment,
+    own: System | DiscreteSystem | None,
+    out: str | Path,
+    progress: Progress | None = None,
 ) -> Results:
     """Compute what is missing of an experiment and write its results."""
     with stop_requests() as stopped:
@@ -38,7 +43,11 @@ def run(
 
 
 def _run(
-    experiment: Experiment, own: System | None, out: Path, progress: Progress, stopped: Callable[[], bool]
+    experiment: Experiment,
+    own: System | DiscreteSystem | None,
+    out: Path,
+    progress: Progress,
+    stopped: Callable[[], bool],
 ) -> Results:
     problem = make(experiment, own)
     compiled = None
@@ -52,6 +61,7 @@ def _run(
         if done == runs and sound(folder) and up_to_date(folder, experiment):
             return Results(folder.path)
         begun = time.perf_counter()
+        bounds = bounds_table(problem, experiment.monte_carlo.seed) if experiment.bounds else None
         compiled = compiled or compile_chunks(problem, experiment.monte_carlo.seed)
         totals = resumed(folder, compiled)
         folder.reopen()
@@ -62,7 +72,7 @@ def _run(
             compiled, folder, totals, runs, threads, experiment.engine.chunk or CAPACITY, progress, stopped
         )
         seconds = time.perf_counter() - begun
-        write(folder, experiment, compiled, totals, seconds, threads)
+        write(folder, experiment, compiled, totals, seconds, threads, bounds)
     return Results(folder.path)
 
 

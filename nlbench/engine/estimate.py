@@ -14,12 +14,13 @@ from nlbench.statistics.totals import Totals
 if TYPE_CHECKING:
     from nlbench.config import Experiment
     from nlbench.schedule import Schedule
+    from nlbench.systems.discrete import DiscreteSystem
     from nlbench.systems.system import System
 
 CALIBRATION_BLOCKS = 16
 
 
-def plan(experiment: Experiment, own: System | None = None) -> dict[str, Any]:
+def plan(experiment: Experiment, own: System | DiscreteSystem | None = None) -> dict[str, Any]:
     """Runs, blocks, steps, filters; seconds to compile and to run; bytes of memory and disk.
 
     Memory is the peak of this process, which has just done the same; it does not grow with the number of runs.

@@ -14,10 +14,13 @@ from nlbench.results.folder import TABLES, RunFolder
 from nlbench.results.manifest import commit, versions
 from nlbench.results.results import Results
 from nlbench.statistics.claims import evaluate
+from nlbench.statistics.consistency import consistency_table
 from nlbench.statistics.summary import tables
 from nlbench.statistics.totals import Totals
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from nlbench.config import Experiment
 
 
@@ -33,10 +36,14 @@ def write(
     totals: Totals,
     seconds: float,
     threads: int,
+    bounds: pd.DataFrame | None = None,
 ) -> None:
     """Write everything that a finished run leaves, the mark that it is done last."""
     problem = compiled.problem
     made = tables(totals)
+    made["consistency"] = consistency_table(totals, made["statistics"], problem.truth.measurements)
+    if bounds is not None:
+        made["bounds"] = bounds
     if experiment.claims:
         made["claims"] = evaluate(experiment.claims, made["statistics"], made["paired"])
     if experiment.traces:

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from nlbench.engine.scores import Score, added, emptied, nothing, score
+from nlbench.statistics.tracks import Scores
+
 if TYPE_CHECKING:
     from nlbench.engine.problem import Runner
     from nlbench.filters.filter import Filter
@@ -15,60 +18,96 @@ if TYPE_CHECKING:
 
 class Followed(NamedTuple):
     """Unique components of mean, covariance and third moment in one axis, (T, k, L), the start first; how many updates
-    the guard replaced, (L,); and how many there were, (L,)."""
+    the guard replaced, (L,); how many there were, (L,); and the scores (T, L), if they were asked for."""
 
     components: Any
     guarded: Any
     updates: Any
+    scores: Scores | None = None
 
 
-def follow(runner: Runner, schedule: Schedule, measurements: Any, lanes: int, keys: Any = None) -> Followed:
+class Carried(NamedTuple):
+    """Of a block: the filter's state; in how many updates the guard replaced it, (L,); the scores since the last
+    output, (L,), if they were asked for."""
+
+    state: Any
+    guarded: Any
+    scores: Scores | None
+
+
+def follow(
+    runner: Runner, schedule: Schedule, measurements: Any, lanes: int, keys: Any = None, scores: bool = False
+) -> Followed:
     """The filter along the measurements (M, m, L) of a block. keys: (2, L), for a filter that draws random numbers."""
     filter = runner.filter
     start = begun(runner, lanes, keys)
     span = runner.step * runner.steps
 
-    def segment(number: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
-        state, guarded = carry
-        t = number * span
+    def moved(state: Any, t: Any) -> Any:
+        return over_lanes(lambda state: filter.integrate(state, t, runner.step, runner.steps))(state)
+
+    def segment(number: Any, carried: Carried) -> Carried:
         if schedule.continuous:
-            return held(number, carry)
-        state = over_lanes(lambda state: filter.integrate(state, t, runner.step, runner.steps))(state)
+            return held(number, carried)
+        carried = carried._replace(state=moved(carried.state, number * span))
         if schedule.measured_every == 0:
-            return state, guarded
+            return carried
         if schedule.measured_every == 1:
-            return measure(number, (state, guarded))
+            return measure(number, carried)
         due = (number + 1) % schedule.measured_every == 0
-        return jax.lax.cond(due, measure, lambda _, carry: carry, number, (state, guarded))
+        return jax.lax.cond(due, measure, lambda _, carried: carried, number, carried)
 
-    def measure(number: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
-        state, guarded = carry
+    def measure(number: Any, carried: Carried) -> Carried:
         y = measurements[(number + 1) // schedule.measured_every - 1]
-        t = (number + 1) * span
-        state, info = over_lanes(lambda state, y: filter.update(state, t, y))(state, y)
-        return state, guarded + info.guarded
+        return updated(filter, carried, (number + 1) * span, y)
 
-    def held(number: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
+    def held(number: Any, carried: Carried) -> Carried:
         """A step under the measurement at its start: a filter's update is the step, a reference must still move."""
-        state, guarded = carry
         t = number * span
-        state, info = over_lanes(lambda state, y: filter.update(state, t, y))(state, measurements[number])
+        carried = updated(filter, carried, t, measurements[number])
         if filter.system.measurement == "discrete":
-            state = over_lanes(lambda state: filter.integrate(state, t, runner.step, runner.steps))(state)
-        return state, guarded + info.guarded
+            carried = carried._replace(state=moved(carried.state, t))
+        return carried
 
-    def to_output(carry: tuple[Any, Any], output: Any) -> tuple[tuple[Any, Any], Any]:
+    def to_output(carried: Carried, output: Any) -> tuple[Carried, Any]:
         first = output * schedule.output_every
         if schedule.output_every == 1:
-            carry = segment(first, carry)
+            carried = segment(first, carried)
         else:
-            carry = jax.lax.fori_loop(first, first + schedule.output_every, segment, carry)
-        return carry, emitted(filter, carry[0])
+            carried = jax.lax.fori_loop(first, first + schedule.output_every, segment, carried)
+        return counted_anew(carried), (emitted(filter, carried.state), carried.scores)
 
-    carry = (start, jnp.zeros(lanes, int))
-    (end, guarded), outputs = jax.lax.scan(to_output, carry, jnp.arange(schedule.outputs))
-    components = joined(filter, schedule, start, outputs, end)
-    return Followed(components, guarded, jnp.full(lanes, schedule.measurements))
+    carried = Carried(start, jnp.zeros(lanes, int), nothing(lanes) if scores else None)
+    end, (outputs, found) = jax.lax.scan(to_output, carried, jnp.arange(schedule.outputs))
+    return Followed(
+        joined(filter, schedule, start, outputs, end.state),
+        end.guarded,
+        jnp.full(lanes, schedule.measurements),
+        from_start(found),
+    )
+
+
+def updated(filter: Filter, carried: Carried, t: Any, y: Any) -> Carried:
+    """After the update at the measurements (m, L)."""
+
+    def one(state: Any, y: Any) -> tuple[Any, Any, Score | None]:
+        state, info = filter.update(state, t, y)
+        return state, info.guarded, None if carried.scores is None else score(filter, info)
+
+    state, guarded, scores = over_lanes(one)(carried.state, y)
+    return Carried(state, carried.guarded + guarded, added(carried.scores, scores))
+
+
+def counted_anew(carried: Any) -> Any:
+    """After an output, whatever it is that carries the scores."""
+    return carried if carried.scores is None else carried._replace(scores=emptied(carried.scores))
+
+
+def from_start(scores: Scores | None) -> Scores | None:
+    """The scores (T, L) of all output times: none at the start."""
+    if scores is None:
+        return None
+    return Scores(*(jnp.concatenate([jnp.zeros_like(part[:1]), part]) for part in scores))
 
 
 def begun(runner: Runner, lanes: int, keys: Any) -> Any:

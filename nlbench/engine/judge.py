@@ -15,6 +15,7 @@ from nlbench.updates.posterior import through_gain
 
 if TYPE_CHECKING:
     from nlbench.statistics.layout import Layout
+    from nlbench.systems.discrete import DiscreteSystem
     from nlbench.systems.system import System
 
 
@@ -29,7 +30,13 @@ class Judged(NamedTuple):
     diverged: Any
 
 
-def judge(rules: System, model: System, layout: Layout, states: Any, components: Any) -> Judged:
+def judge(
+    rules: System | DiscreteSystem,
+    model: System | DiscreteSystem,
+    layout: Layout,
+    states: Any,
+    components: Any,
+) -> Judged:
     """Compare the true states (T, n, L) with the moments (T, k, L) that a filter gave at the same times.
 
     rules: the system whose rules of divergence hold. model: the filter's, which says what the errors of its state are.
@@ -48,7 +55,9 @@ def _apart(array: Any) -> list[Any]:
     return [array[:, place] for place in range(array.shape[1])]
 
 
-def _one(rules: System, model: System, x: list[Any], given: list[Any]) -> Judged:
+def _one(
+    rules: System | DiscreteSystem, model: System | DiscreteSystem, x: list[Any], given: list[Any]
+) -> Judged:
     """One trajectory at one time: n states, k components."""
     mean, cov, third = _parted(given, model.states)
     error, cov, third = _errors(model, x, mean, cov, third)
@@ -72,7 +81,7 @@ def _parted(given: list[Any], n: int) -> tuple[Tensor, Tensor, Tensor]:
 
 
 def _errors(
-    system: System, x: list[Any], mean: Tensor, cov: Tensor, third: Tensor
+    system: System | DiscreteSystem, x: list[Any], mean: Tensor, cov: Tensor, third: Tensor
 ) -> tuple[Tensor, Tensor, Tensor]:
     """The error and its estimated moments; through the Jacobian where the system has its own errors."""
     if system.error is None:
@@ -84,7 +93,7 @@ def _errors(
     return about.value, through_gain(J, cov), through_gain(J, third)
 
 
-def _lasting(system: System, layout: Layout, diverged: Any) -> Any:
+def _lasting(system: System | DiscreteSystem, layout: Layout, diverged: Any) -> Any:
     """Where the rule says so, a run that has diverged at a report time stays diverged."""
     if not system.diverged_stays:
         return diverged
@@ -92,7 +101,7 @@ def _lasting(system: System, layout: Layout, diverged: Any) -> Any:
     return diverged | (jnp.cumsum(diverged & reported[:, None], axis=0) > 0)
 
 
-def _late(rules: System, layout: Layout, error: Any, diverged: Any) -> Any:
+def _late(rules: System | DiscreteSystem, layout: Layout, error: Any, diverged: Any) -> Any:
     """A run whose errors were large over the last part of it has diverged at its end."""
     late = rules.diverged_late
     if late is None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -13,7 +15,8 @@ from nlbench.errors import ConfigError
 from nlbench.moments.moments import Moments
 from nlbench.simulate import path
 from nlbench.statistics.layout import Layout
-from nlbench.systems.system import Coordinate, InitialPosterior, Sets, System
+from nlbench.systems.discrete import DiscreteSystem
+from nlbench.systems.system import Coordinate, InitialPosterior, Sets, System, kind
 
 if TYPE_CHECKING:
     from nlbench.config import Experiment, FilterSpec
@@ -22,7 +25,8 @@ if TYPE_CHECKING:
 
 
 class Runner(NamedTuple):
-    """A filter of the experiment: the moments it starts from, and its steps in a segment, of length `step`."""
+    """A filter of the experiment: the moments it starts from, and its steps in a segment, of length `step`; in discrete
+    time, where t is a number of steps, that is the integer 1."""
 
     label: str
     filter: Filter
@@ -38,12 +42,12 @@ class Problem(NamedTuple):
     steps at which sightings are made, where the undisturbed motion decides it.
     """
 
-    truth: System
+    truth: System | DiscreteSystem
     runners: tuple[Runner, ...]
     schedule: Schedule
     layout: Layout
     block: int
-    judged_by: System
+    judged_by: System | DiscreteSystem
     nominal_steps: tuple[int, ...] = ()
 
     @property
@@ -52,41 +56,56 @@ class Problem(NamedTuple):
         return self.truth.sample.size if isinstance(self.truth.sample, Sets) else 1
 
 
-def make(experiment: Experiment, own: System | None = None) -> Problem:
+def make(experiment: Experiment, own: System | DiscreteSystem | None = None) -> Problem:
     """The problem that an experiment states, about the user's own system if one is given.
 
-    Raises `ConfigError` where model and data do not fit each other.
+    Raises `ConfigError`, with all that was found, where a filter does not apply and where model and data do not fit.
     """
     stated = own or systems.build(
         experiment.system.name, **{**experiment.system.parameters, **experiment.truth}
     )
     truth = stated.truth or stated
-    end, step, output = experiment.time.end, experiment.time.step, experiment.time.output
-    sightings = truth.sightings.most(end) if truth.sightings else 0
-    continuous = truth.measurement == "continuous"
-    times = schedule.make(end, step, output, truth.interval, sightings, continuous)
-    runners = [_runner(experiment, spec, own, times) for spec in experiment.filters]
+    filters.check(truth)
+    times = _schedule(experiment, truth)
+    makers: list[Callable[[], Runner]] = [
+        partial(_fitting, experiment, spec, own, truth, times) for spec in experiment.filters
+    ]
     if experiment.reference is not None:
-        known = replace(_sampled(truth, times), exact=_roomy(truth.exact, times))
-        runners.append(_bound(experiment.reference, experiment.reference, known, {}, truth.initial, times))
-    for runner in runners:
-        model = runner.filter.system
-        if runner.label != experiment.reference and model.measurement != truth.measurement:
-            raise ConfigError(
-                f"{runner.label}: its measurements are {model.measurement}, and those of the data {truth.measurement}"
-            )
-        if (model.states, model.measurements) != (truth.states, truth.measurements):
-            raise ConfigError(
-                f"{runner.label}: its model has {model.states} states and {model.measurements} measurements, "
-                f"the data {truth.states} and {truth.measurements}"
-            )
+        makers.append(partial(_reference, experiment.reference, truth, times))
+    runners = _all(makers)
     layout, block = _layout(experiment, stated), experiment.engine.block
-    return Problem(truth, tuple(runners), times, layout, block, stated, _nominal_steps(truth, times))
+    return Problem(truth, runners, times, layout, block, stated, _nominal_steps(truth, times))
 
 
-def _nominal_steps(truth: System, times: Schedule) -> tuple[int, ...]:
+def _all(makers: list[Callable[[], Runner]]) -> tuple[Runner, ...]:
+    """What each of them makes. Raises `ConfigError` with every problem of theirs, each once."""
+    runners, problems = [], []
+    for make_one in makers:
+        try:
+            runners.append(make_one())
+        except ConfigError as error:
+            problems += error.problems
+    if problems:
+        raise ConfigError(list(dict.fromkeys(problems)))
+    return tuple(runners)
+
+
+def _schedule(experiment: Experiment, truth: System | DiscreteSystem) -> Schedule:
+    """When things happen. Raises `ConfigError` where time is discrete and the interval is not whole."""
+    end, step, output = experiment.time.end, experiment.time.step, experiment.time.output
+    if isinstance(truth, System):
+        sightings = truth.sightings.most(end) if truth.sightings else 0
+        return schedule.make(
+            end, step, output, truth.interval, sightings, continuous=truth.measurement == "continuous"
+        )
+    if truth.interval is not None and truth.interval != round(truth.interval):
+        raise ConfigError(f"interval: got {truth.interval:g}; where time is discrete it is a number of steps")
+    return schedule.make(round(end), 1, round(output), truth.interval)
+
+
+def _nominal_steps(truth: System | DiscreteSystem, times: Schedule) -> tuple[int, ...]:
     """When the motion from the initial mean reaches the angle of each sighting; never is a step after the last."""
-    if truth.sightings is None or not truth.sightings.nominal:
+    if isinstance(truth, DiscreteSystem) or truth.sightings is None or not truth.sightings.nominal:
         return ()
     import jax
 
@@ -97,6 +116,12 @@ def _nominal_steps(truth: System, times: Schedule) -> tuple[int, ...]:
     return tuple(int(step) + 1 for step in np.searchsorted(np.maximum.accumulate(angles), due))
 
 
+def _reference(name: str, truth: System | DiscreteSystem, times: Schedule) -> Runner:
+    """The exact posterior of what makes the data."""
+    known = replace(_sampled(truth, times), exact=_roomy(truth.exact, times))
+    return _bound(name, name, known, {}, truth.initial, times)
+
+
 def _roomy(exact: Any, times: Schedule) -> Any:
     """A reference that remembers its measurements, with room for those of the schedule."""
     if not isinstance(exact, InitialPosterior):
@@ -104,27 +129,40 @@ def _roomy(exact: Any, times: Schedule) -> Any:
     return exact._replace(most=times.sightings or times.measurements or 1)
 
 
-def _sampled(truth: System, times: Schedule) -> System:
+def _sampled(truth: System | DiscreteSystem, times: Schedule) -> System | DiscreteSystem:
     """The truth as a reference sees it: continuous measurements are samples, one at the start of each step."""
-    if not times.continuous:
+    if isinstance(truth, DiscreteSystem) or not times.continuous:
         return truth
     variance = np.asarray(truth.measurement_cov, float) / times.step
     return replace(truth, measurement="discrete", measurement_cov=variance)
 
 
-def _runner(experiment: Experiment, spec: FilterSpec, own: System | None, times: Schedule) -> Runner:
-    system = own or systems.build(experiment.system.name, **{**experiment.system.parameters, **spec.model})
-    initial = _overridden(system.initial, {**experiment.initial, **spec.initial})
+def _fitting(
+    experiment: Experiment,
+    spec: FilterSpec,
+    own: System | DiscreteSystem | None,
+    truth: System | DiscreteSystem,
+    times: Schedule,
+) -> Runner:
+    """A filter whose model fits the data. Raises `ConfigError` for another."""
+    model = own or systems.build(experiment.system.name, **{**experiment.system.parameters, **spec.model})
+    expected, found = _described(truth), _described(model)
+    if found != expected:
+        raise ConfigError(f"{spec.label}: its model has {found}, the data {expected}")
+    initial = overridden(model.initial, {**experiment.initial, **spec.initial})
     options = {**spec.options, "missing": False}
-    if system.measurement == "continuous":
-        options = {**_stated(spec), "missing": False, "step": _only_step(spec, times)}
-    return _bound(spec.label, spec.name, system, options, initial, times)
+    if kind(model).continuous:
+        options["step"] = _only_step(spec, times)
+    return _bound(spec.label, spec.name, model, options, initial, times)
 
 
-def _stated(spec: FilterSpec) -> dict[str, Any]:
-    """The options that differ from their defaults, which may be others where measurements are continuous."""
-    defaults = filters.options(spec.name)().model_dump(mode="json")
-    return {name: value for name, value in spec.options.items() if value != defaults[name]}
+def _described(system: System | DiscreteSystem) -> str:
+    """What of a system data and model must have in common."""
+    discrete, continuous = kind(system)
+    return (
+        f"{'discrete' if discrete else 'continuous'} time, {system.states} states and {system.measurements} "
+        f"{'continuous ' if continuous else ''}measurements"
+    )
 
 
 def _only_step(spec: FilterSpec, times: Schedule) -> float:
@@ -137,16 +175,20 @@ def _only_step(spec: FilterSpec, times: Schedule) -> float:
     return times.step
 
 
-def _bound(label: str, name: str, system: System, options: dict, initial: Moments, times: Schedule) -> Runner:
+def _bound(
+    label: str, name: str, system: System | DiscreteSystem, options: dict, initial: Moments, times: Schedule
+) -> Runner:
     if name == "exact":
         options = {}
+    bound = filters.build(name, system, **options)
+    if isinstance(system, DiscreteSystem):
+        return Runner(label, bound, initial, times.step, times.segment_steps)
     span = times.step * times.segment_steps
-    longest = options.get("step") or times.step
-    steps = max(1, math.ceil(span / longest - 1e-9))
-    return Runner(label, filters.build(name, system, **options), initial, span / steps, steps)
+    steps = max(1, math.ceil(span / (options.get("step") or times.step) - 1e-9))
+    return Runner(label, bound, initial, span / steps, steps)
 
 
-def _overridden(initial: Moments, given: dict[str, Any]) -> Moments:
+def overridden(initial: Moments, given: dict[str, Any]) -> Moments:
     """Initial moments with those given in their place."""
     changed = Moments(
         given.get("mean", initial.mean), given.get("cov", initial.cov), initial.third, initial.fourth
@@ -165,7 +207,7 @@ def state_names(n: int) -> list[str]:
     return ["x"] if n == 1 else [f"x{i + 1}" for i in range(n)]
 
 
-def _layout(experiment: Experiment, truth: System) -> Layout:
+def _layout(experiment: Experiment, truth: System | DiscreteSystem) -> Layout:
     coordinates = truth.coordinates or tuple(Coordinate(name) for name in state_names(truth.states))
     times, reports = experiment.layout_times()
     return Layout(
@@ -177,4 +219,5 @@ def _layout(experiment: Experiment, truth: System) -> Layout:
         clip=truth.clip or (math.inf,) * len(coordinates),
         norms=truth.norms,
         keep_runs=experiment.monte_carlo.keep_runs,
+        scores=experiment.scores,
     )

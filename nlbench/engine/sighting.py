@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from nlbench.engine.follow import Followed, begun, emitted, joined, over_lanes
+from nlbench.engine.follow import Followed, begun, counted_anew, emitted, from_start, joined, over_lanes
+from nlbench.engine.scores import Score, added, nothing, score
 from nlbench.orbit import wrapped
+from nlbench.statistics.tracks import Scores
 
 if TYPE_CHECKING:
     from nlbench.engine.problem import Problem, Runner
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
 
 class Progress(NamedTuple):
     """Of a block: steps made; the filter's state; per lane the angle followed so far, whether a sighting is due, how
-    many were made, and in how many the guard replaced the update."""
+    many were made, in how many the guard replaced the update, and the scores since the last output."""
 
     step: Any
     state: Any
@@ -29,12 +31,13 @@ class Progress(NamedTuple):
     due: Any
     made: Any
     guarded: Any
+    scores: Scores | None
 
 
-def follow_sightings(problem: Problem, runner: Runner, data: Simulated) -> Followed:
+def follow_sightings(problem: Problem, runner: Runner, data: Simulated, scores: bool = False) -> Followed:
     """The filter along the truth (steps + 1, n, L) of a block, whose sightings have the noise (K, m, L)."""
     schedule, lanes, filter = problem.schedule, problem.block, runner.filter
-    truth, seen_angle = problem.truth.sightings, filter.angle
+    truth, seen_angle = getattr(problem.truth, "sightings", None), filter.angle
     if truth is None or seen_angle is None:
         raise ValueError("a schedule with sightings needs systems that say what they are")
 
@@ -60,15 +63,19 @@ def follow_sightings(problem: Problem, runner: Runner, data: Simulated) -> Follo
         y = over_lanes(lambda number, x, noise: truth.observe(truth.mark(number), x) + noise)(
             number, x, noise
         )
-        updated, info = over_lanes(lambda state, y, number: filter.update(state, t, y, sighting=number))(
-            before.state, y, number
-        )
+
+        def one(state: Any, y: Any, number: Any) -> tuple[Any, Any, Score | None]:
+            state, info = filter.update(state, t, y, sighting=number)
+            return state, info.guarded, score(filter, info) if scores else None
+
+        updated, guarded, gained = over_lanes(one)(before.state, y, number)
         due = before.due
         return before._replace(
             state=jax.tree.map(lambda new, old: jnp.where(due, new, old), updated, before.state),
             due=jnp.zeros_like(due),
             made=before.made + due,
-            guarded=before.guarded + (info.guarded & due),
+            guarded=before.guarded + (guarded & due),
+            scores=added(before.scores, gained, due),
         )
 
     def to_output(before: Progress, output: Any) -> tuple[Progress, Any]:
@@ -80,10 +87,19 @@ def follow_sightings(problem: Problem, runner: Runner, data: Simulated) -> Follo
             return jax.lax.cond(jnp.any(now.due), measured, lambda now: now, now)
 
         after = jax.lax.while_loop(lambda now: now.step < last, leg, before)
-        return after, emitted(filter, after.state)
+        return counted_anew(after), (emitted(filter, after.state), after.scores)
 
     state = begun(runner, lanes, data.key)
     none = jnp.zeros(lanes, int)
-    start = Progress(jnp.asarray(0), state, jnp.zeros(lanes), jnp.zeros(lanes, bool), made=none, guarded=none)
-    end, outputs = jax.lax.scan(to_output, start, jnp.arange(schedule.outputs))
-    return Followed(joined(filter, schedule, state, outputs, end.state), end.guarded, end.made)
+    start = Progress(
+        step=jnp.asarray(0),
+        state=state,
+        angle=jnp.zeros(lanes),
+        due=jnp.zeros(lanes, bool),
+        made=none,
+        guarded=none,
+        scores=nothing(lanes) if scores else None,
+    )
+    end, (outputs, found) = jax.lax.scan(to_output, start, jnp.arange(schedule.outputs))
+    components = joined(filter, schedule, state, outputs, end.state)
+    return Followed(components, end.guarded, end.made, from_start(found))

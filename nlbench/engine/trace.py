@@ -21,10 +21,13 @@ if TYPE_CHECKING:
     from nlbench.engine.block import View
     from nlbench.engine.compiled import Compiled
     from nlbench.engine.problem import Problem
+    from nlbench.systems.discrete import DiscreteSystem
     from nlbench.systems.system import System
 
 
-def replay(experiment: Experiment, own: System | None, label: str, trajectory: int) -> pd.DataFrame:
+def replay(
+    experiment: Experiment, own: System | DiscreteSystem | None, label: str, trajectory: int
+) -> pd.DataFrame:
     """Output times as rows. Of each error: its value and the standard deviation that the filter states; of each state:
     the truth, and the filter's mean, variance and third moment; the measurement taken at that time (NaN where none
     was), where times are fixed; whether diverged.
@@ -96,7 +99,7 @@ def _states(problem: Problem, view: View, number: int) -> dict[str, np.ndarray]:
     return columns
 
 
-def _names(problem: Problem, system: System) -> Sequence[str]:
+def _names(problem: Problem, system: System | DiscreteSystem) -> Sequence[str]:
     """Names of the states: those of the errors, where these are plain differences of states."""
     return problem.layout.coordinates if system.error is None else state_names(system.states)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from nlbench.errors import ConfigError
 from nlbench.figures import style
+from nlbench.figures.consistency import nees
 from nlbench.figures.data import Data, read
 from nlbench.figures.divergence import divergence
 from nlbench.figures.error_curves import mean_error, rms, rms_clipped
@@ -25,6 +26,7 @@ FIGURES: dict[str, Callable[[Data], Iterator[Picture]]] = {
     "mean_error": mean_error,
     "variance": variance,
     "third_moment": third_moment,
+    "nees": nees,
     "divergence": divergence,
     "trace": trace,
 }

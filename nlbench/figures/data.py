@@ -33,6 +33,8 @@ class Data(NamedTuple):
     paired: pd.DataFrame
     divergence: pd.DataFrame
     traces: pd.DataFrame
+    consistency: pd.DataFrame | None = None
+    bounds: pd.DataFrame | None = None
 
     def coordinates(self, statistic: str) -> tuple[str, ...]:
         """Coordinates (and named norms) for which the statistic was saved at more than one time, in table order."""
@@ -49,6 +51,14 @@ class Data(NamedTuple):
         curve = self.curve(label, coordinate, statistic)
         here = np.flatnonzero(np.abs(curve.time - time) < 1e-9)
         return (float(curve.value[here[0]]), float(curve.stderr[here[0]])) if here.size else (np.nan, np.nan)
+
+    def bound(self, coordinate: str) -> Curve | None:
+        """The Cramer-Rao bound of RMS errors, known without error; None where there is none."""
+        if self.bounds is None:
+            return None
+        rows = self.bounds[(self.bounds["coordinate"] == coordinate) & (self.bounds["statistic"] == "pcrb")]
+        time, value, n = (rows[column].to_numpy(float) for column in ("time", "value", "n"))
+        return Curve(time, value, np.zeros_like(value), n) if len(rows) else None
 
     @property
     def any_diverged(self) -> bool:
@@ -76,6 +86,8 @@ def read(results: Results) -> Data:
         traces=results.table("traces")
         if "traces" in results.tables
         else pd.DataFrame(columns=["trajectory"]),
+        consistency=results.table("consistency") if "consistency" in results.tables else None,
+        bounds=results.table("bounds") if "bounds" in results.tables else None,
     )
 
 

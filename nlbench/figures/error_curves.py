@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nlbench.figures import bands, ratios, scales, style
-from nlbench.figures.data import Data
+from nlbench.figures.data import Curve, Data
 from nlbench.figures.picture import Picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+BOUND = {"color": "#000000", "linewidth": 1.0, "linestyle": (0, (1, 1.2))}
+BOUND_WORDS = "Cramer-Rao bound"
 WORDS = {"rms": "RMS error", "rms_clipped": "clipped RMS error", "mean_error": "mean error"}
 
 
@@ -66,6 +68,11 @@ def _root_mean_square(subject: Subject) -> Picture:
     panels = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2)) if compared else [figure.subplots()]
     scales.positive(panels[0], *_curves(panels[0], subject))
     words = f"{subject.title}. {_ends(subject)}"
+    bound = _bound(subject)
+    if bound is not None:
+        words += (
+            f" The Cramer-Rao bound, which no filter's error over all runs is below: {bound.value[-1]:.3g}."
+        )
     if subject.statistic == "rms" and data.any_diverged:
         words += " Diverged runs are left out."
     if compared:
@@ -88,7 +95,16 @@ def _curves(axes: Axes, subject: Subject) -> tuple[np.ndarray, np.ndarray]:
     for index, (label, curve) in enumerate(zip(data.filters, curves, strict=True)):
         bands.draw_confidence(axes, curve, looks[label].colour)
         axes.plot(curve.time, curve.value, **style.line(looks[label], index, len(curve.time)))
+    bound = _bound(subject)
+    if bound is not None:
+        axes.plot(bound.time, bound.value, zorder=1.8, **BOUND)
+        curves.append(bound)
     return bands.steady(curves), np.concatenate(band)
+
+
+def _bound(subject: Subject) -> Curve | None:
+    """The bound of the root mean square errors of runs that are all counted."""
+    return subject.data.bound(subject.coordinate) if subject.statistic == "rms" else None
 
 
 def _finish(figure: Figure, top: Axes, bottom: Axes, subject: Subject) -> None:
@@ -101,6 +117,8 @@ def _finish(figure: Figure, top: Axes, bottom: Axes, subject: Subject) -> None:
     bottom.set_xlabel(style.with_unit("time", data.units["time"]))
     looks = style.looks(data.filters, data.reference)
     entries = {label: Line2D([], [], **style.key(looks[label])) for label in data.filters}
+    if _bound(subject) is not None:
+        entries[BOUND_WORDS] = Line2D([], [], **BOUND)
     style.legend(figure, {**entries, **bands.source_entry(data)})
 
 

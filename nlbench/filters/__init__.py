@@ -5,46 +5,53 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from nlbench.filters.catalogue import FILTERS, available, options, row, summary
+from nlbench.filters.catalogue import FILTERS, available, options, refusal, row, summary
 
 if TYPE_CHECKING:
     from nlbench.filters.filter import Filter
+    from nlbench.systems.discrete import DiscreteSystem
     from nlbench.systems.system import System
 
-__all__ = ["available", "build", "options", "summary"]
+__all__ = ["available", "build", "check", "options", "summary"]
 
 
-def build(name: str, system: System, **options: Any) -> Filter:
+def build(name: str, system: System | DiscreteSystem, **options: Any) -> Filter:
     """The filter of that name for a system.
 
-    options: those of `nlbench.filters.options(name)`.
+    options: those of `nlbench.filters.options(name, discrete, continuous)` for a system of that kind.
     Raises `ConfigError` for an unknown name or option, where the filter does not apply to the system,
     and where what the system's functions return has the wrong shape.
     """
     from nlbench.checks import checked, known
     from nlbench.errors import ConfigError
     from nlbench.runtime import ensure_precision
-    from nlbench.systems.system import System as ContinuousTime
+    from nlbench.systems.system import kind
 
-    known(name, FILTERS, what="filter")
-    found = row(
-        name,
-        discrete=not isinstance(system, ContinuousTime),
-        continuous=isinstance(system, ContinuousTime) and system.measurement == "continuous",
-    )
-    if found.family == "moment" and not isinstance(system, ContinuousTime):
-        raise ConfigError(f"{name}: integrates a drift in time, and the system's time is discrete")
+    of = kind(system)
+    found = row(known(name, FILTERS, what="filter"), *of)
+    refused = refusal(name, *of)
+    if refused:
+        raise ConfigError(f"{name}: {refused}")
     chosen = checked(found.options, options, where=name)
     ensure_precision()
-    if isinstance(system, ContinuousTime):
-        from nlbench.filters.shapes import check_shapes
-
-        check_shapes(system)
+    check(system)
     if found.family == "reference":
         from nlbench.references import build as build_reference
 
         return build_reference(system)
     return _builder(found.family)(name, found, system, chosen)
+
+
+def check(system: System | DiscreteSystem) -> None:
+    """Raises `ConfigError` with a line for each shape in a system that does not fit, got and expected."""
+    from nlbench.discrete import shapes as in_steps
+    from nlbench.filters import shapes
+    from nlbench.systems.discrete import DiscreteSystem
+
+    if isinstance(system, DiscreteSystem):
+        in_steps.check_shapes(system)
+    else:
+        shapes.check_shapes(system)
 
 
 def _builder(family: str) -> Callable[..., Filter]:
@@ -53,6 +60,8 @@ def _builder(family: str) -> Callable[..., Filter]:
         from nlbench.continuous import build
     elif family == "discrete":
         from nlbench.discrete import build
+    elif family == "baseline":
+        from nlbench.filters.unfiltered import build
     else:
         from nlbench.filters.moment import build
     return build

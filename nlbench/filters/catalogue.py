@@ -9,6 +9,7 @@ from pydantic import BaseModel, Field, PositiveFloat, PositiveInt
 from nlbench.continuous.catalogue import ROWS as CONTINUOUS
 from nlbench.continuous.catalogue import SHARED as ALSO_CONTINUOUS
 from nlbench.discrete.catalogue import ROWS as DISCRETE
+from nlbench.discrete.catalogue import Options as SampledOptions
 from nlbench.row import Row, StrictOptions
 
 
@@ -59,6 +60,10 @@ class TwoStepOptions(CurvedOptions):
     """Options of the two-step updates."""
 
     steps: PositiveInt = Field(default=10, description="RK4 steps in pseudo-time")
+    closure: Literal["quasi-moment", "cumulant"] | None = Field(
+        default=None,
+        description="of fifth and sixth moments; default: quasi-moment if corrected, cumulant if printed",
+    )
 
 
 class DirectOptions(CurvedOptions):
@@ -189,7 +194,29 @@ EXACT = Row(
     StrictOptions,
     "reference",
 )
-FILTERS = {**DISCRETE, **CONTINUOUS, **MOMENT, "exact": EXACT}
+NO_FILTER = Row(
+    "the initial mean and covariance throughout, whatever is measured",
+    "a baseline",
+    1,
+    "none",
+    SampledOptions,
+    "baseline",
+)
+FILTERS = {**DISCRETE, **CONTINUOUS, **MOMENT, "no-filter": NO_FILTER, "exact": EXACT}
+
+# Kinds of systems, (discrete, continuous) as in `row`, and which of them a family of filters takes.
+KINDS = {
+    (False, False): "continuous time",
+    (True, False): "discrete time",
+    (False, True): "continuous measurements",
+}
+TAKEN = {
+    "moment": [(False, False)],
+    "continuous": [(False, True)],
+    "discrete": [(False, False), (True, False)],
+    "baseline": list(KINDS),
+    "reference": list(KINDS),
+}
 
 
 def row(name: str, discrete: bool = False, continuous: bool = False) -> Row:
@@ -202,14 +229,30 @@ def row(name: str, discrete: bool = False, continuous: bool = False) -> Row:
     return DISCRETE[name] if discrete and name in DISCRETE else FILTERS[name]
 
 
+def takes(name: str) -> tuple[tuple[bool, bool], ...]:
+    """The kinds of systems that filters of that name are for, (discrete, continuous) as in `row`."""
+    return tuple(kind for kind in KINDS if kind in TAKEN[row(name, *kind).family])
+
+
+def refusal(name: str, discrete: bool = False, continuous: bool = False) -> str | None:
+    """Why no filter of that name is for systems of a kind; None where one is."""
+    if (discrete, continuous) in takes(name):
+        return None
+    if discrete:
+        return "integrates a drift in time, and the system's time is discrete"
+    if continuous:
+        return "takes measurements at discrete times, and the system's are continuous"
+    return "takes continuous measurements, and the system's are at discrete times"
+
+
 def available() -> tuple[str, ...]:
     """Names that `nlbench.filters.build` takes."""
     return tuple(FILTERS)
 
 
-def options(name: str) -> type[BaseModel]:
-    """The pydantic model of the filter's options."""
-    return FILTERS[name].options
+def options(name: str, discrete: bool = False, continuous: bool = False) -> type[BaseModel]:
+    """The pydantic model of the options of the filter that `row` gives."""
+    return row(name, discrete, continuous).options
 
 
 def summary(name: str) -> str:

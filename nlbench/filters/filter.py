@@ -41,6 +41,7 @@ class Filter(NamedTuple):
     angle: state -> the central angle that sightings wait for; None without sightings.
     history: (state, times (T,)) -> Components (T,): the moments at earlier times, for a filter that remembers all it
         needs and computes them dearly; the engine then asks for them once, at the end. None for the others.
+    limiter: how many standard deviations its residuals are clipped at; None if they are not.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Filter(NamedTuple):
     random: bool = False
     angle: Callable | None = None
     history: Callable | None = None
+    limiter: float | None = None
 
 
 def central_angle(system: System, mean: Tensor) -> Any:

@@ -16,7 +16,6 @@ import jax
 import jax.numpy as jnp
 
 from nlbench.algebra import Tensor, shared, zeros
-from nlbench.errors import ConfigError
 from nlbench.filters.filter import Filter, UpdateInfo, central_angle
 from nlbench.moments import integrate as integration
 from nlbench.moments.equations import fourth_moment_rate, rates
@@ -55,16 +54,16 @@ CURVED: dict[str, Callable[[Any], Callable[[Components, Seen], Outcome]]] = {
     "tempering": lambda options: partial(
         tempering, steps=options.steps, measurement=options.measurement, equations=options.equations
     ),
-    "two-step": lambda options: partial(two_step, steps=options.steps, equations=options.equations),
+    "two-step": lambda options: partial(
+        two_step, steps=options.steps, equations=options.equations, closure=options.closure
+    ),
     "direct": lambda options: partial(direct, points=options.points),
     "quadrature": lambda options: partial(quadrature, points=options.points),
 }
 
 
 def build(name: str, row: Row, system: System, options: Options) -> Filter:
-    """The filter of a catalogue row, bound to a system. Raises `ConfigError` if its measurements are continuous."""
-    if system.measurement == "continuous":
-        raise ConfigError(f"{name}: takes measurements at discrete times, and the system's are continuous")
+    """The filter of a catalogue row, bound to a system measured at discrete times."""
     integrator = integration.build(**options.integrator.model_dump())
     updated = _curved_update if row.update in CURVED else _linear_update
 
@@ -99,6 +98,7 @@ def build(name: str, row: Row, system: System, options: Options) -> Filter:
         integrate=integrate,
         components=lambda state: state,
         angle=(lambda state: central_angle(system, state.mean)) if system.sightings else None,
+        limiter=options.limiter,
     )
 
 

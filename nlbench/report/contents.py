@@ -39,6 +39,7 @@ def contents(results: Results, drawn: list[Path]) -> dict[str, Any]:
         ],
         "any_diverged": read.any_diverged,
         "divergence": tables.divergence(read),
+        "consistency": tables.consistency(read, experiment.report_times),
         "cost": tables.cost(optional["cost"]) if "cost" in optional else None,
         "figures": embedded(drawn),
         "moments": moments(optional["moments"], read) if "moments" in optional else None,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -112,6 +112,40 @@ def divergence(data: Data) -> Table:
         )
     heads = ["filter", "diverged runs", "fraction [95 % interval]", "median time", "guarded updates"]
     return Table("divergence", "Diverged runs and guarded updates", heads, rows)
+
+
+def consistency(data: Data, times: Iterable[float]) -> Table | None:
+    """NEES of every filter at the report times, and NIS over the whole run; nothing of a run that has neither."""
+    if data.consistency is None or not len(data.consistency):
+        return None
+    table = data.consistency
+    columns = [("nees", repr(float(time)), f"NEES at {_at(time, data)}") for time in times]
+    columns.append(("nis", "all", "NIS of all measurements"))
+    found = {(row["filter"], row["score"], row["time"]): row for row in table.to_dict("records")}
+    there = [column for column in columns if any((label, *column[:2]) in found for label in data.filters)]
+    dof = {score: int(rows["dof"].iloc[0]) for score, rows in table.groupby("score")}
+    rows = [
+        [name(label), *(_consistency(found.get((label, score, time))) for score, time, _ in there)]
+        for label in data.filters
+    ]
+    right = listed([f"{score.upper()} {dof[score]}" for score in ("nees", "nis") if score in dof])
+    caption = (
+        f"Squared errors and residuals in what the filters state of them, ± standard error; right is {right}"
+    )
+    return Table("consistency", caption, ["filter", *(words for *_, words in there)], rows)
+
+
+def _consistency(row: dict[str, Any] | None) -> Cell:
+    """A mean, and on which side of its bounds it lies if it has some and is not within them."""
+    if row is None or math.isnan(row["value"]):
+        return number("–", math.nan)
+    cell = number(uncertain(row["value"], row["stderr"]), row["value"])
+    if pd.isna(row["consistent"]):
+        return cell._replace(text=f"{cell.text}, selected")
+    if row["consistent"]:
+        return cell._replace(text=f"{cell.text}, consistent")
+    words = "overconfident" if row["value"] > row["high"] else "too cautious"
+    return cell._replace(text=f"{cell.text}, {words}")
 
 
 def claims(table: pd.DataFrame) -> Table:

@@ -13,6 +13,7 @@ from jax.lax import optimization_barrier
 from jaxtyping import Array, Bool
 
 from nlbench.statistics.layout import Layout
+from nlbench.statistics.score_sums import score_sums
 from nlbench.statistics.tracks import Tracks
 from nlbench.statistics.uncertainty import NORMAL_975
 
@@ -40,6 +41,7 @@ def block_sums(tracks: Tracks, mask: Bool[Array, " L"], layout: Layout) -> dict[
         **_cross(deviation, tracks, alive[:, reports], layout),
         **_pairs(error[:, reports], at_reports, alive[:, reports], layout),
         **_divergence(lost[:, reports], mask, tracks),
+        **({} if tracks.scores is None else score_sums(tracks.scores, alive)),
         "report_error": tracks.error[:, reports],
         "report_diverged": lost[:, reports],
     }

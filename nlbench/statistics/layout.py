@@ -12,7 +12,8 @@ class Layout(NamedTuple):
 
     `times` includes t = 0; `reports` are indices into `times`. `clip` is the value at which |error| is
     capped in clipped statistics (infinite = never; a diverged run then counts as infinite). `norms` names
-    Euclidean norms over some coordinates; coordinates and norms together are the *magnitudes*.
+    Euclidean norms over some coordinates; coordinates and norms together are the *magnitudes*. `scores`:
+    whether filters are scored by how they foretold the measurements.
     """
 
     filters: tuple[str, ...]
@@ -23,6 +24,7 @@ class Layout(NamedTuple):
     clip: tuple[float, ...]
     norms: dict[str, tuple[int, ...]]
     keep_runs: int
+    scores: bool = True
 
     @property
     def report_times(self) -> tuple[float, ...]:

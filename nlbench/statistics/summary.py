@@ -11,6 +11,7 @@ from nlbench.statistics.layout import Layout
 from nlbench.statistics.medians import medians
 from nlbench.statistics.moments import moments_table
 from nlbench.statistics.paired import paired_table
+from nlbench.statistics.scores import scored
 from nlbench.statistics.totals import Totals
 from nlbench.statistics.uncertainty import wilson
 
@@ -27,6 +28,8 @@ STATISTICS = (
     "nees",
     "coverage_95",
     "diverged",
+    "nis",
+    "log_likelihood",
 )
 
 
@@ -47,7 +50,7 @@ def statistics_table(totals: Totals) -> pd.DataFrame:
     `time` is text: the shortest that reads back as the same number ("0.5", "2.0"), or "all".
     """
     layout = totals.layout
-    estimates = [*averages(totals), *error_moments(totals), medians(totals)]
+    estimates = [*averages(totals), *error_moments(totals), medians(totals), *scored(totals)]
     times = (*layout.times, "all")
     coordinates = (*layout.magnitudes, "all")
     keys, values = [], []

@@ -5,6 +5,22 @@ from typing import NamedTuple
 from jaxtyping import Array, Bool, Float, Int
 
 
+class Scores(NamedTuple):
+    """How well each filter foretold the measurements; axes as below.
+
+    A sample is a measurement of which the filter foretold mean and covariance. Left out are those whose residual a
+    limiter clipped, those whose update the guard replaced, and those foretold with a covariance that is not positive
+    definite: what is left then is a selection, smaller than a right filter's.
+    """
+
+    nis: Float[
+        Array, "F T L"
+    ]  # sum of the normalised innovations squared of the samples since the output before
+    samples: Int[Array, "F T L"]  # how many those are
+    left_out: Int[Array, "F T L"]  # how many there were beside them
+    log_likelihood: Float[Array, "F T L"]  # sum over all measurements so far
+
+
 class Tracks(NamedTuple):
     """Axes: F filters, T output times (t = 0 first), R report times, C coordinates, L lanes (trajectories).
 
@@ -21,3 +37,4 @@ class Tracks(NamedTuple):
     diverged: Bool[Array, "F T L"]  # by the system's rule
     guarded: Int[Array, "F L"]  # updates in which the guard fired
     updates: Int[Array, "F L"]  # updates made
+    scores: Scores | None = None  # None where nothing is measured, or nobody asked

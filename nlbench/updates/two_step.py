@@ -27,13 +27,19 @@ from nlbench.updates.nonlinear import Outcome, Seen
 from nlbench.updates.pseudo_time import Derivatives, expected
 
 
-def two_step(prior: Components, seen: Seen, steps: int = 10, equations: str = "corrected") -> Outcome:
-    """The moments at s = 1."""
+def two_step(
+    prior: Components,
+    seen: Seen,
+    steps: int = 10,
+    equations: str = "corrected",
+    closure: Closure | None = None,
+) -> Outcome:
+    """The moments at s = 1. closure: as for `rates`."""
     straight = (kalman if prior.third is None else hermite3)(prior, seen.gain, seen.z, seen.z)
     M, noise = seen.curvature(), inverse(seen.R)
 
     def rate(s: Any, moments: Components) -> tuple[Components, Any]:
-        return rates(s, moments, prior.mean, seen.z, seen.gain.H, M, noise, equations)
+        return rates(s, moments, prior.mean, seen.z, seen.gain.H, M, noise, equations, closure)
 
     moments, gained = pseudo_time.integrated(rate, straight.moments, steps)
     density = (

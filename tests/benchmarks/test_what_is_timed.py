@@ -170,7 +170,7 @@ def test_the_engine_row_runs_every_trajectory_it_is_credited_with(tmp_path, monk
     assert {len(value) for value in sums.values()} == {ours.BLOCKS_OF_A_CALL}
 
 
-@pytest.mark.parametrize("peer", [peers.dynamax, peers.filterpy])
+@pytest.mark.parametrize("peer", [peers.dynamax, peers.cuthbert, peers.filterpy])
 def test_peers_equal_the_oracle(peer):
     y = workloads.measurements(SMALL_OSCILLATOR)
     try:

@@ -74,3 +74,18 @@ def test_doctor_ends_with_five_when_something_is_wrong(monkeypatch):
     assert done.stderr == "not in order: jax\n"
     monkeypatch.setattr(doctor, "doctor", lambda: [("python", True, "3.12")])
     assert invoke("doctor").exit_code == 0
+
+
+def test_the_list_says_which_systems_a_filter_is_for_and_of_which_kind_a_system_is():
+    def kinds(what):
+        return {each["name"]: each["kinds"] for each in json.loads(invoke("list", what, "--json").stdout)}
+
+    assert kinds("systems")["ungm"] == ["discrete time"]
+    assert kinds("systems")["schwartz"] == ["continuous measurements"]
+    assert kinds("filters")["third-order"] == ["continuous time"]
+    assert kinds("filters")["ukf"] == ["continuous time", "discrete time"]
+    assert "\nfor continuous time, discrete time\n" in "\n" + invoke("list", "filters").stdout
+    shown = json.loads(invoke("list", "filters", "ekf", "--json").stdout)
+    others = shown["parameters_of_other_kinds"]
+    assert "equations" not in {each["name"] for each in others["discrete time"]}
+    assert "\ndiscrete time\n" in invoke("list", "filters", "ekf").stdout

@@ -121,13 +121,22 @@ def test_filters_of_discrete_measurements_are_refused_by_name(tmp_path):
 
 
 def test_a_model_with_the_other_kind_of_measurements_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match=r"third-order.*discrete.*continuous"):
+    with pytest.raises(ConfigError, match=r"third-order.*1 measurements.*continuous measurements"):
         run(tmp_path, [{"name": "third-order", "model": {"measurement": "linear"}}])
 
 
 def test_a_filter_has_the_steps_of_the_run(tmp_path):
     with pytest.raises(ConfigError, match=r"kushner-3.step.*time.step"):
         run(tmp_path, [{"name": "kushner-3", "step": 0.005}])
+
+
+def test_a_filter_of_two_kinds_takes_the_options_of_the_one_that_it_is(tmp_path):
+    """The default integrator of `ekf` is Euler's here; where measurements are at times it is Runge-Kutta's."""
+    integrators = {"default": {}, "euler": {"solver": "euler"}, "rk4": {"solver": "rk4"}}
+    entries = [{"name": "ekf", "integrator": each, "label": label} for label, each in integrators.items()]
+    found = run(tmp_path, entries)
+    np.testing.assert_array_equal(errors(found, "default"), errors(found, "euler"))
+    assert (errors(found, "rk4") != errors(found, "euler")).all()
 
 
 def test_filters_may_assume_what_is_not_true(tmp_path):

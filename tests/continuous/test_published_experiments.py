@@ -5,16 +5,13 @@ Clipped RMS, medians and counts of divergence of every filter, every statistic o
 
 from __future__ import annotations
 
-import json
-import math
-from pathlib import Path
-
 import pytest
 
 import nlbench as nb
 from nlbench import config
+from tests.published import assert_agrees, published, report_times
 
-PUBLISHED = json.loads((Path(__file__).parents[1] / "golden" / "experiments_continuous.json").read_text())
+PUBLISHED = published("experiments_continuous")
 CULVER = {
     "LK": {"name": "linearised-kalman"},
     "second": {"name": "kushner-2"},
@@ -50,7 +47,6 @@ GROUPS = {
     "schwartz/D1/M11": ({"name": "schwartz"}, SCHWARTZ, 5.0),
     "schwartz/D2/M22": ({"name": "schwartz", "dynamics": "D2", "measurement": "M22"}, THREE, 5.0),
 }
-ROBUST = ("rms_clipped", "median_error")
 WELL_BEHAVED = ("LK", "second", "EXACT")  # of the group 7.7-7.9; all of Schwartz's are
 
 
@@ -69,33 +65,12 @@ def test_agrees_with_an_independent_implementation(group, tmp_path):
                 "system": system,
                 "filters": [{**entry, "label": labels[name]} for name, entry in entries.items()],
                 "time": {"end": end, "step": 0.001, "output": 0.1},
-                "report_times": [float(time) for time in PUBLISHED[group][next(iter(entries))]],
+                "report_times": report_times({name: PUBLISHED[group][name] for name in labels}),
                 "monte_carlo": {"runs": 20_000, "seed": 7},
                 **reference,
             }
         ),
         tmp_path,
     )
-    table = results.table("statistics").set_index(["filter", "time", "statistic", "coordinate"])
-    compared = 0
-    for name, label in labels.items():
-        everything = group.startswith("schwartz") or name in WELL_BEHAVED
-        for time, statistics in PUBLISHED[group][name].items():
-            for statistic, (value, stderr, runs) in statistics.items():
-                where = (label, str(float(time)), statistic)
-                if statistic == "diverged":
-                    mine = table.loc[(*where, "all")]
-                    _same_rate(mine.value * mine.n, mine.n, value, runs, (name, *where))
-                elif everything or statistic in ROBUST:
-                    mine = table.loc[(*where, "x")]
-                    error = math.hypot(mine.stderr, stderr)
-                    assert abs(mine.value - value) <= max(5 * error, 1e-5 * abs(value)), (name, *where)
-                else:
-                    continue
-                compared += 1
-    assert compared >= 15 * len(labels)
-
-
-def _same_rate(count: float, n: int, other: float, runs: int, where: tuple) -> None:
-    rate = max(count + other, 1.0) / (n + runs)
-    assert abs(count / n - other / runs) <= 5 * math.sqrt(rate * (1 / n + 1 / runs)), where
+    well_behaved = PUBLISHED[group] if group.startswith("schwartz") else WELL_BEHAVED
+    assert_agrees(results.table("statistics"), labels, PUBLISHED[group], well_behaved)

@@ -115,6 +115,16 @@ def test_printed_forms_are_not_gaussian_filters_any_more(options):
     np.testing.assert_allclose(right.third, 0.0, atol=1e-14)
 
 
+@pytest.mark.parametrize("options", [{"equations": "printed"}, {"equations": "printed-scalar"}])
+def test_printed_forms_step_the_fourth_moment_by_the_rectangular_rule(options):
+    h, start = 0.01, nb.Moments([0.3], [[0.4]], [[[0.1]]], np.full((1,) * 4, 0.6))
+    f = nb.filters.build("kushner-4", at_rest(h), **options)
+    state, y = f.init(start), np.array([4.0])
+    rates, after = f.rates(state, 0.0, y), f.moments(f.update(state, 0.0, y)[0])
+    for mine, before, rate in zip(after, start, rates, strict=True):
+        np.testing.assert_allclose(mine, before + h * np.asarray(rate), rtol=1e-12)
+
+
 TWO = {
     "drift": lambda t, x: -x,
     "measurement_cov": [[1.0]],

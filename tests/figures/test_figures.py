@@ -30,7 +30,7 @@ def test_every_figure_is_drawn_for_every_coordinate(drawn):
         "divergence"
     }
     assert {path.name for path in drawn} == {f"{name}.{kind}" for name in expected for kind in ("svg", "png")}
-    assert set(figures.FIGURES) == {*PER_COORDINATE, "divergence", "trace"}
+    assert set(figures.FIGURES) == {*PER_COORDINATE, "nees", "divergence", "trace"}
     assert all(path.exists() for path in drawn)
 
 

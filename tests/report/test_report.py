@@ -49,7 +49,11 @@ def written(run):
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
-    tables = {"claims": synthetic_run.claims(), "cost": synthetic_run.cost()}
+    tables = {
+        "claims": synthetic_run.claims(),
+        "cost": synthetic_run.cost(),
+        "consistency": synthetic_run.consistency(synthetic_run.FACTORS, 20_000),
+    }
     run = synthetic_run.results(
         folder, coordinates={"position": "ft", "speed": "ft/s"}, diverged={"third-order": 37}, tables=tables
     )
@@ -100,9 +104,9 @@ def test_links_within_the_page_have_a_target_and_identifiers_are_unique(page):
 
 def test_every_figure_has_a_text_instead(page):
     figures = Page(page[1]).all("svg")
-    assert len(figures) == 11
+    assert len(figures) == 12
     assert all(attributes["role"] == "img" and attributes["aria-labelledby"] for attributes in figures)
-    assert page[1].count("<title id=") == page[1].count("<desc id=") == 11
+    assert page[1].count("<title id=") == page[1].count("<desc id=") == 12
 
 
 def test_tables_have_headings_of_rows_and_columns(page):
@@ -113,11 +117,29 @@ def test_tables_have_headings_of_rows_and_columns(page):
 
 
 def test_optional_parts_appear_with_their_tables_only(page, tmp_path):
-    for part in ('id="claims"', 'id="cost"', "✓ confirmed", "✗ refuted", "? undecided", "125"):
+    for part in (
+        'id="claims"',
+        'id="cost"',
+        'id="consistency"',
+        "✓ confirmed",
+        "✗ refuted",
+        "? undecided",
+        "125",
+    ):
         assert part in page[1]
     bare = written(synthetic_run.results(tmp_path, **QUICK))[1]
     assert 'id="claims"' not in bare
     assert 'id="cost"' not in bare
+    assert 'id="consistency"' not in bare
+
+
+def test_consistency_is_told_in_words(page):
+    section = page[1].split('<section id="consistency">')[1].split("</section>")[0]
+    rows = {row.split("<")[0]: row for row in section.split('class="name">')[1:]}
+    assert "2.600 ± 0.014, overconfident" in rows["linearised-kalman"]
+    assert "1.800 ± 0.014, too cautious" in rows["exact"]
+    assert "1.000 ± 0.010, consistent" in rows["exact"]
+    assert "1.000 ± 0.010, selected" in rows["third-order-guarded"]
 
 
 def test_divergence_is_counted_in_words(page, tmp_path):

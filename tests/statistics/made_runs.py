@@ -16,13 +16,13 @@ import numpy as np
 from nlbench.statistics import accumulate
 from nlbench.statistics.layout import Layout
 from nlbench.statistics.totals import Totals
-from nlbench.statistics.tracks import Tracks
+from nlbench.statistics.tracks import Scores, Tracks
 
 LANES = 64
 
 
 class Runs(NamedTuple):
-    """The fields of `Tracks`, for all runs."""
+    """The fields of `Tracks`, for all runs; then those of its scores."""
 
     error: np.ndarray
     variance: np.ndarray
@@ -32,6 +32,10 @@ class Runs(NamedTuple):
     cross_third: np.ndarray
     diverged: np.ndarray
     guarded: np.ndarray
+    nis: np.ndarray
+    samples: np.ndarray
+    left_out: np.ndarray
+    log_likelihood: np.ndarray
 
 
 def layout(
@@ -57,7 +61,10 @@ def layout(
 
 
 def make(layout: Layout, runs: int, seed: int, lost: float = 0.02) -> Runs:
-    """Skewed errors that filters share in part; some runs diverge, some hold NaN or infinity unflagged."""
+    """Skewed errors that filters share in part; some runs diverge, some hold NaN or infinity unflagged.
+
+    Up to three measurements of two entries come between outputs, and some runs lose their likelihood on the way.
+    """
     rng = np.random.default_rng(seed)
     f, t, c = len(layout.filters), len(layout.times), len(layout.coordinates)
     r, n = len(layout.reports), runs
@@ -66,6 +73,8 @@ def make(layout: Layout, runs: int, seed: int, lost: float = 0.02) -> Runs:
     raw = np.einsum("ij,ftjn->ftin", mixing, common + 0.5 * own)
     error = 0.2 + 0.5 * raw + 0.1 * raw**2
     variance = rng.uniform(0.3, 1.0, (f, t, c, n))
+    samples = rng.integers(0, 4, (f, t, n)) * (np.arange(t) > 0)[:, None]
+    gained = np.where(rng.random((f, t, n)) < 0.01, np.nan, rng.normal(-2.0, 1.0, (f, t, n)))
     runs_made = Runs(
         error=error,
         variance=np.where(rng.random(variance.shape) < 0.01, -variance, variance),
@@ -75,6 +84,10 @@ def make(layout: Layout, runs: int, seed: int, lost: float = 0.02) -> Runs:
         cross_third=rng.normal(size=(f, r, len(layout.components(3)), n)),
         diverged=rng.random((f, t, n)) < lost,
         guarded=rng.integers(0, 3, (f, n)),
+        nis=np.where(samples > 0, rng.chisquare(np.maximum(2 * samples, 1)), 0.0),
+        samples=samples,
+        left_out=rng.binomial(1, 0.1, (f, t, n)) * (np.arange(t) > 0)[:, None],
+        log_likelihood=np.cumsum(np.where((np.arange(t) > 0)[:, None], gained, 0.0), axis=1),
     )
     for field, bad in (("error", np.nan), ("variance", np.inf), ("third", -np.inf), ("cov", np.nan)):
         array = getattr(runs_made, field)
@@ -92,7 +105,8 @@ def blocks(runs: Runs, updates: int = 7):
             part = array[..., start : start + real]
             rubbish = np.full((*part.shape[:-1], LANES - real), np.nan if part.dtype == float else 1)
             parts.append(np.concatenate([part, rubbish.astype(part.dtype)], axis=-1))
-        yield Tracks(*parts, np.full(parts[-1].shape, updates)), np.arange(LANES) < real
+        tracks, scores = parts[:8], Scores(*parts[8:])
+        yield Tracks(*tracks, np.full(tracks[-1].shape, updates), scores), np.arange(LANES) < real
 
 
 _COMPILED: dict[str, Callable] = {}
@@ -147,6 +161,10 @@ def statistics(runs: Runs, layout: Layout) -> dict[tuple[str, str, str, str], tu
         good = ~bad[f, t]
         at = label, repr(time)
         rows[(*at, "all", "diverged")] = bad[f, t].mean(), len(good)
+        if t > 0:
+            rows |= scores(runs, at, f, [t], good)
+            likelihood = runs.log_likelihood[f, t, good & np.isfinite(runs.log_likelihood[f, t])]
+            rows[(*at, "all", "log_likelihood")] = likelihood.mean(), len(likelihood)
         joint = runs.nees[f, t][good & np.isfinite(runs.nees[f, t])]
         rows[(*at, "all", "nees")] = joint.mean(), len(joint)
         for name in layout.magnitudes:
@@ -171,6 +189,7 @@ def statistics(runs: Runs, layout: Layout) -> dict[tuple[str, str, str, str], tu
             rows[(*at, name, "nees")] = np.mean(e[positive] ** 2 / v[positive]), positive.sum()
     for f, label in enumerate(layout.filters):
         never = ~bad[f].any(axis=0)
+        rows |= scores(runs, (label, "all"), f, range(1, len(layout.times)), never)
         for name in layout.magnitudes:
             sizes = np.stack(
                 [magnitude(runs, layout, f, t, name)[never] for t in range(1, len(layout.times))]
@@ -181,6 +200,12 @@ def statistics(runs: Runs, layout: Layout) -> dict[tuple[str, str, str, str], tu
                 never.sum(),
             )
     return rows
+
+
+def scores(runs: Runs, at: tuple[str, str], f: int, times, chosen: np.ndarray) -> dict:
+    """The mean over all samples of the chosen runs at these times."""
+    count = runs.samples[f, list(times)][:, chosen].sum()
+    return {(*at, "all", "nis"): (runs.nis[f, list(times)][:, chosen].sum() / count, count)}
 
 
 def keyed(table) -> dict:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from nlbench.statistics import accumulate
+from nlbench.statistics.tracks import Scores
 from tests.statistics import made_runs
 from tests.statistics.made_runs import block_sums
 
@@ -33,7 +34,11 @@ def _fill(tracks, lanes, value):
     for name in ("error", "variance", "third", "nees", "cov", "cross_third"):
         floats[name] = getattr(tracks, name).copy()
         floats[name][..., lanes] = value
-    return tracks._replace(**floats)
+    scores = []
+    for array in tracks.scores:
+        scores.append(array.copy())
+        scores[-1][..., lanes] = value if array.dtype == float else 3
+    return tracks._replace(**floats, scores=Scores(*scores))
 
 
 @pytest.mark.parametrize("field", ["error", "variance", "third"])
@@ -59,7 +64,7 @@ def test_a_lane_with_a_cross_moment_that_is_not_finite_is_lost_at_that_report_ti
 
 def test_counts_are_exact():
     tracks, mask = one_block(runs=40, lost=0.2)
-    bad = made_runs.lost(made_runs.Runs(*tracks[:8]), LAYOUT) | ~mask
+    bad = made_runs.lost(made_runs.Runs(*tracks[:8], *tracks.scores), LAYOUT) | ~mask
     sums = block_sums(tracks, mask, LAYOUT)
     at_reports = bad[:, list(LAYOUT.reports)]
     assert int(sums["total"]) == 40

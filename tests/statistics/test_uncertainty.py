@@ -85,6 +85,10 @@ def test_intervals_cover_the_truth_as_often_as_they_say(runs):
         cross_third=zeros[:, :2],
         diverged=zeros[:, :, 0] > 0,
         guarded=np.zeros((1, runs), int),
+        nis=zeros[:, :, 0],
+        samples=np.zeros((1, 2001, runs), int),
+        left_out=np.zeros((1, 2001, runs), int),
+        log_likelihood=zeros[:, :, 0],
     )
     variance = b**2 + 2 * c**2
     truth = {

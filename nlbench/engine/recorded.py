@@ -1,0 +1,173 @@
+"""The filters of an experiment along recorded data, and how well they foretold them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import numpy as np
+
+from nlbench import filters, systems
+from nlbench.config.consistency import MOST_STEPS
+from nlbench.config.schema import FilterSpec
+from nlbench.engine.compiled import use_cache
+from nlbench.engine.problem import overridden
+from nlbench.errors import ConfigError, Problem
+from nlbench.filters import data
+from nlbench.statistics.chi_square import quantile
+from nlbench.systems.system import kind
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from nlbench.config import Experiment
+    from nlbench.config.recording import Recording
+    from nlbench.filters.filter import Filter
+
+TAIL = 0.025
+
+
+class Foretold(NamedTuple):
+    """How well a filter foretold the data.
+
+    log_likelihood: of all of them; NaN where the filter's density was not positive at one of them.
+    nis: mean of z' S^-1 z over `samples` measurements; `expected` is their mean number of entries. low, high: between
+    them lie 95 % of the means of a filter that is right, by chi-square; NaN where there are no bounds, because some
+    updates were `altered` (`nlbench.filters.data.Followed`) and the others are a selection.
+    lost: the first row whose estimate is not finite, or None.
+    """
+
+    log_likelihood: float
+    nis: float
+    expected: float
+    low: float
+    high: float
+    samples: int
+    altered: int
+    lost: int | None
+
+    @property
+    def verdict(self) -> str:
+        """What the mean says of the covariances that the filter foretold."""
+        if self.lost is not None:
+            return "FAILED"
+        if not math.isfinite(self.nis) or not math.isfinite(self.low):
+            return "not judged"
+        if self.low <= self.nis <= self.high:
+            return "consistent"
+        return "overconfident" if self.nis > self.high else "too cautious"
+
+
+class Filtered(NamedTuple):
+    """A filter's label, the table of `nlbench.filter_data`, and how well it foretold the data."""
+
+    label: str
+    table: pd.DataFrame
+    foretold: Foretold
+
+
+def bound(experiment: Experiment, labels: Sequence[str]) -> list[Filter]:
+    """Those filters of the experiment, each on the system that it believes in, with its step and initial moments.
+
+    Raises `ConfigError` with every problem there is.
+    """
+    made, problems = [], []
+    for spec in _specs(experiment):
+        if spec.label in labels:
+            try:
+                made.append(_bound(experiment, spec))
+            except ConfigError as error:
+                problems += error.problems
+    if problems:
+        raise ConfigError(list(dict.fromkeys(problems)))
+    return made
+
+
+def filtered(
+    experiment: Experiment, labels: Sequence[str], recording: Recording, start: float = 0.0
+) -> Iterator[Filtered]:
+    """What each of those filters says along the recording, from its initial moments at `start`.
+
+    Raises `ConfigError` before anything is computed where the recording does not fit the filters.
+    """
+    made = bound(experiment, labels)
+    times = np.array(recording.times)
+    y = np.array(recording.values).reshape(len(times), -1)
+    problems = [each for label, f in zip(labels, made, strict=True) for each in _misfit(label, f, recording)]
+    problems += _too_long(experiment, made, recording, start)
+    if problems:
+        raise ConfigError(problems)
+    use_cache()
+    key = jax.random.key(experiment.monte_carlo.seed)
+    for label, f in zip(labels, made, strict=True):
+        followed = data.follow(f, times, y, start, key)
+        yield Filtered(label, data.table(f, followed, recording.names), foretold(followed))
+
+
+def foretold(followed: data.Followed) -> Foretold:
+    """The summary of what a filter said."""
+    fair = (followed.taken > 0) & ~followed.altered
+    samples, altered = int(fair.sum()), int(followed.altered.sum())
+    degrees = float(followed.taken[fair].sum())
+    expected = degrees / samples if samples else math.nan
+    low = high = math.nan
+    if samples and not altered:
+        low, high = (quantile(tail, np.array([degrees])).item() / samples for tail in (TAIL, 1 - TAIL))
+    finite = np.isfinite(followed.mean).all(1) & np.isfinite(followed.variance).all(1)
+    return Foretold(
+        log_likelihood=float(followed.log_likelihood.sum()),
+        nis=float(followed.nis[fair].mean()) if samples else math.nan,
+        expected=expected,
+        low=low,
+        high=high,
+        samples=samples,
+        altered=altered,
+        lost=None if finite.all() else int(np.argmin(finite)),
+    )
+
+
+def _specs(experiment: Experiment) -> list[FilterSpec]:
+    """The filters, and the reference, which believes in what makes the data."""
+    reference = experiment.reference
+    if reference is None:
+        return experiment.filters
+    return [*experiment.filters, FilterSpec(name=reference, label=reference, model=experiment.truth)]
+
+
+def _bound(experiment: Experiment, spec: FilterSpec) -> Filter:
+    system = systems.build(experiment.system.name, **{**experiment.system.parameters, **spec.model})
+    if getattr(system, "sightings", None):
+        raise ConfigError(
+            f"{spec.label}: the system is measured at angles, and recorded data have times only"
+        )
+    initial = overridden(system.initial, {**experiment.initial, **spec.initial})
+    options: dict[str, Any] = dict(spec.options)
+    if "missing" in options:
+        options["missing"] = True
+    if not kind(system).discrete and "step" in options:
+        options["step"] = options["step"] or experiment.time.step
+    return filters.build(spec.name, replace(system, initial=initial), **options)
+
+
+def _misfit(label: str, f: Filter, recording: Recording) -> Iterator[Problem]:
+    m, names = f.system.measurements, recording.names
+    if m != len(names):
+        found = f"{len(names)} measured column{'s' if len(names) > 1 else ''} ({', '.join(names)})"
+        hint = "; name those that it measures with --measured" if len(names) > m else ""
+        yield Problem(f"{found}, but the system of '{label}' measures {m}{hint}", file=recording.file, line=1)
+
+
+def _too_long(
+    experiment: Experiment, made: Sequence[Filter], recording: Recording, start: float
+) -> Iterator[Problem]:
+    span = recording.times[-1] - start
+    discrete = any(kind(f.system).discrete for f in made)
+    step = 1.0 if discrete else experiment.time.step
+    if span / step > MOST_STEPS:
+        message = (
+            f"{span / step:.2g} steps of {step:g} from the start to the last row, more than {MOST_STEPS:,}"
+        )
+        yield Problem(f"{message}; --start says when the filters start", file=recording.file)

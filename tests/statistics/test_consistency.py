@@ -1,0 +1,96 @@
+"""Chi-square quantiles equal scipy's; a consistent filter lies within its bounds as often as they say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import special, stats
+
+from nlbench.statistics.chi_square import lower_gamma, quantile
+from nlbench.statistics.consistency import COLUMNS, consistency_table
+from nlbench.statistics.summary import statistics_table
+from tests.statistics import made_runs
+
+
+@pytest.mark.parametrize("probability", [1e-4, 0.025, 0.5, 0.975, 0.9999])
+def test_quantiles_equal_scipys(probability):
+    """log Gamma(a) has some digits fewer than a has more: 2e-9 of the probability at 3e6 degrees."""
+    degrees = np.array([[1, 2, 3, 7], [50, 1001, 40_000, 3_000_000]])
+    expected = stats.chi2.ppf(probability, degrees)
+    np.testing.assert_allclose(quantile(probability, degrees)[0], expected[0], rtol=1e-11)
+    np.testing.assert_allclose(quantile(probability, degrees)[1], expected[1], rtol=1e-8)
+
+
+def test_the_lower_gamma_function_equals_scipys():
+    a = np.array([0.5, 1.0, 4.5, 300.0, 20_000.0])
+    for deviations in (-0.6, 0.0, 4.0):
+        x = a + deviations * np.sqrt(a)
+        np.testing.assert_allclose(lower_gamma(a, x), special.gammainc(a, x), rtol=1e-9)
+
+
+def test_nothing_has_no_quantile():
+    assert np.isnan(quantile(0.5, np.array([0.0, np.nan]))).all()
+
+
+def made(filters, times, runs, left_out=0, factor=1.0):
+    """NEES and NIS that are chi-square times a factor, and the table that is made of them."""
+    layout = made_runs.layout(filters=filters, times=times)
+    invented = made_runs.make(layout, runs, seed=12, lost=0.0)
+    rng = np.random.default_rng(7)
+    samples = invented.samples
+    invented = invented._replace(
+        nees=factor * rng.chisquare(2, invented.nees.shape),
+        nis=np.where(samples > 0, factor * rng.chisquare(np.maximum(3 * samples, 1)), 0.0),
+        left_out=np.zeros_like(samples),
+    )
+    invented.left_out[0, 1, :left_out] = 1
+    totals = made_runs.total(invented, layout)
+    statistics = statistics_table(totals)
+    return layout, statistics, consistency_table(totals, statistics, measurements=3)
+
+
+def test_a_consistent_filter_is_within_the_bounds_as_often_as_they_say():
+    _, statistics, table = made(filters=1, times=601, runs=150)
+    assert list(table.columns) == list(COLUMNS)
+    for score, rows in table[table.time != "all"].groupby("score"):
+        assert len(rows) == (601 if score == "nees" else 600)
+        inside = rows.consistent.sum()
+        assert abs(inside - 0.95 * len(rows)) < 4 * np.sqrt(0.95 * 0.05 * len(rows))
+        np.testing.assert_allclose(rows.low, stats.chi2.ppf(0.025, rows.n * rows.dof) / rows.n, rtol=1e-9)
+        np.testing.assert_allclose(rows.high, stats.chi2.ppf(0.975, rows.n * rows.dof) / rows.n, rtol=1e-9)
+        assert set(rows.dof) == ({2} if score == "nees" else {3})
+    own = statistics[(statistics.coordinate == "all") & (statistics.statistic == "nis")]
+    np.testing.assert_array_equal(table[table.score == "nis"].value, own.value)
+    np.testing.assert_array_equal(table[table.score == "nis"].n, own.n)
+
+
+@pytest.mark.parametrize("factor", [0.7, 1.4])
+def test_a_filter_that_misjudges_itself_is_found_out(factor):
+    *_, table = made(filters=2, times=3, runs=2000, factor=factor)
+    assert not table.consistent.any()
+    assert (table.value < table.low).all() if factor < 1 else (table.value > table.high).all()
+
+
+def test_a_selection_of_samples_has_no_bounds():
+    *_, table = made(filters=2, times=3, runs=300, left_out=1)
+    table = table.set_index(["filter", "score", "time"])
+    for time in ("0.5", "all"):
+        row = table.loc["filter 1", "nis", time]
+        assert np.isnan([row.low, row.high]).all()
+        assert row.consistent is pd.NA
+    others = table.drop([("filter 1", "nis", time) for time in ("0.5", "all")])
+    assert others.consistent.notna().all()
+    assert others.low.notna().all()
+
+
+def test_the_table_survives_both_formats(tmp_path):
+    from nlbench.results.tables import csv_bytes, parquet_bytes, read_parquet
+
+    *_, table = made(filters=1, times=2, runs=100, left_out=1)
+    back = read_parquet(parquet_bytes(table))
+    pd.testing.assert_series_equal(back.value, table.value)
+    assert [None if pd.isna(x) else bool(x) for x in back.consistent] == [
+        None if pd.isna(x) else bool(x) for x in table.consistent
+    ]
+    assert ",True\n" in csv_bytes(table).decode()
