@@ -51,7 +51,7 @@ def timed(name: str, rounds: int) -> list[dict[str, Any]]:
     from benchmarks import ours, peers, rows, table, workloads
 
     if name == "libraries":
-        libraries = [ours.ekf, rows.plain_ekf, peers.dynamax, peers.filterpy]
+        libraries = [ours.ekf, rows.plain_ekf, peers.dynamax, peers.cuthbert, peers.filterpy]
         return table.measure(workloads.OSCILLATOR, libraries, rounds)
     filters = [rows.c_filter, rows.c_peak, ours.third_order, rows.plain_third_order]
     whole = [rows.c_experiment, ours.simulated, ours.engine]

@@ -39,6 +39,41 @@ def dynamax(workload: Workload, y: np.ndarray) -> Row:
     return jax_row("dynamax", workload, function, y, lambda posterior: posterior.filtered_means[:, -1])
 
 
+def cuthbert(workload: Workload, y: np.ndarray) -> Row:
+    """cuthbert's EKF (its `moments` filter), vmapped over trajectories; it carries square roots of covariances, by QR,
+    and also forms a log-likelihood."""
+    import jax
+    import jax.numpy as jnp
+
+    try:
+        from cuthbert import filter as filtered
+        from cuthbert.gaussian import moments
+    except ImportError as reason:
+        raise Unavailable(f"cuthbert: {reason}") from reason
+
+    n = len(workload.mean)
+    no_noise, noise = jnp.zeros((n, n)), jnp.asarray(np.linalg.cholesky(workload.noise_cov))
+
+    def transition(x: Any) -> Any:
+        return rk4(lambda x: workload.drift(jnp, x), x, workload.step), no_noise
+
+    def observe(x: Any) -> Any:
+        return workload.observe(jnp, x), noise
+
+    ekf = moments.build_filter(
+        m0=jnp.asarray(workload.mean),
+        chol_P0=jnp.asarray(np.linalg.cholesky(workload.cov)),
+        get_dynamics_params=lambda state, y: (transition, state.mean),
+        get_observation_params=lambda state, y: (observe, state.mean, y),
+    )
+
+    def kept(y: Any) -> Any:
+        states = filtered(ekf, y, ekf.init_prepare())
+        return states.mean, states.chol_cov, states.log_normalizing_constant
+
+    return jax_row("cuthbert", workload, jax.jit(jax.vmap(kept)), y, lambda kept: kept[0][:, -1])
+
+
 def filterpy(workload: Workload, y: np.ndarray) -> Row:
     """filterpy's EKF, a loop over measurements and trajectories; four trajectories stand for all."""
     try:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nlbench.errors import ConfigError
 from nlbench.systems.discrete import DiscreteSystem
@@ -10,29 +11,54 @@ from nlbench.systems.discrete import DiscreteSystem
 if TYPE_CHECKING:
     import pandas as pd
 
-    from nlbench.filters.filter import Filter
+    from nlbench.filters.filter import Filter, UpdateInfo
 
 
-def filter_data(f: Filter, times: Any, y: Any, t0: Any = 0, key: Any = None) -> pd.DataFrame:
+class Followed(NamedTuple):
+    """What a filter said along T rows of data, as NumPy arrays.
+
+    times: (T,). mean, variance: (T, n), after the measurement. innovation: (T, m), NaN where nothing was measured.
+    nis: (T,), NaN where none was measured. log_likelihood: (T,), 0 there.
+    taken: (T,), the number of entries measured. altered: (T,), whether the limiter clipped an entry of the residual,
+    the guard replaced the update, or the innovation's covariance was not positive definite: then NIS is no fair sample.
+    """
+
+    times: Any
+    mean: Any
+    variance: Any
+    innovation: Any
+    nis: Any
+    log_likelihood: Any
+    taken: Any
+    altered: Any
+
+
+def filter_data(
+    f: Filter, times: Any, y: Any, t0: Any = 0, key: Any = None, measurements: Sequence[str] | None = None
+) -> pd.DataFrame:
     """The filter `f` from its system's initial moments at t0 along measurements y at `times`: one row for each.
 
     times: (T,), not descending, none before t0; step numbers where time is discrete. y: (T, m), or (T,) for m = 1; NaN
         means not measured, and a row without measurements is a prediction.
     key: of filters that draw random numbers; None means seed 0.
-    Columns: `time`; `<name>_mean` and `<name>_variance` of each state after the measurement; `<name>_innovation` of
-    each measurement, what was measured minus what was foretold, NaN where nothing was; `nis`, the innovation squared
+    measurements: names of what y holds; default y1 ... ym (y for one).
+    Columns: `time`; `<name>_mean` and `<name>_variance` of each state after the measurement; `<measurement>_innovation`
+    of each measurement, what was measured minus what was foretold, NaN where nothing was; `nis`, the innovation squared
     over its covariance, chi-square distributed with as many degrees as entries were measured if the model is right,
     NaN where none was; `log_likelihood` of the measurement, 0 where there was none: its sum is that of the data.
     Raises `ConfigError` where times or shapes do not fit, and for continuous measurements.
     """
+    return table(f, follow(f, times, y, t0, key), measurements)
+
+
+def follow(f: Filter, times: Any, y: Any, t0: Any = 0, key: Any = None) -> Followed:
+    """What `filter_data` makes its table of, and what of it is no fair sample of NIS."""
     import jax
     import jax.numpy as jnp
     import numpy as np
-    import pandas as pd
 
     times, y = _checked(f, np.asarray(times), np.asarray(y, float), t0)
-    key = jax.random.key(0) if key is None else key
-    first, *keys = jax.random.split(key, 2 * len(times) + 1)
+    first, *pairs = _keys(key, len(times))
 
     def one(carry: tuple[Any, Any], given: tuple[Any, ...]) -> tuple[tuple[Any, Any], tuple[Any, ...]]:
         (state, before), (t, values, predicting, updating) = carry, given
@@ -40,24 +66,60 @@ def filter_data(f: Filter, times: Any, y: Any, t0: Any = 0, key: Any = None) -> 
         state, info = f.update(state, t, values, updating)
         moments, z = f.moments(state), info.innovation
         nis = z @ jnp.linalg.solve(info.innovation_cov, z)
-        return (state, t), (moments.mean, jnp.diagonal(moments.cov), z, nis, info.log_likelihood)
+        said = (moments.mean, jnp.diagonal(moments.cov), z, nis, info.log_likelihood, _altered(f, info))
+        return (state, t), said
 
     @jax.jit
     def along(state: Any, given: tuple[Any, ...]) -> Any:
         return jax.lax.scan(one, (state, jnp.asarray(t0, times.dtype)), given)[1]
 
     start = f.init(f.system.initial, first)
-    given = (jnp.asarray(times), jnp.asarray(y), jnp.stack(keys[::2]), jnp.stack(keys[1::2]))
-    mean, variance, innovation, nis, log_likelihood = (np.asarray(part) for part in along(start, given))
+    said = along(start, (jnp.asarray(times), jnp.asarray(y), *pairs))
+    mean, variance, innovation, nis, log_likelihood, altered = (np.asarray(part) for part in said)
     there = ~np.isnan(y)
-    columns: dict[str, Any] = {"time": times}
+    some = there.any(1)
+    return Followed(
+        times=times,
+        mean=mean,
+        variance=variance,
+        innovation=np.where(there, innovation, np.nan),
+        nis=np.where(some, nis, np.nan),
+        log_likelihood=np.where(some, log_likelihood, 0.0),
+        taken=there.sum(1),
+        altered=altered & some,
+    )
+
+
+def table(f: Filter, followed: Followed, measurements: Sequence[str] | None = None) -> pd.DataFrame:
+    """The columns of `filter_data`."""
+    import pandas as pd
+
+    m = followed.innovation.shape[1]
+    names = list(measurements or _numbered("y", m))
+    if len(set(names)) != m:
+        raise ConfigError(f"measurements: expected {m} different names, got {', '.join(map(str, names))}")
+    columns: dict[str, Any] = {"time": followed.times}
     for i, name in enumerate(_state_names(f)):
-        columns |= {f"{name}_mean": mean[:, i], f"{name}_variance": variance[:, i]}
-    for r, name in enumerate(_numbered("y", y.shape[1])):
-        columns[f"{name}_innovation"] = np.where(there[:, r], innovation[:, r], np.nan)
-    columns["nis"] = np.where(there.any(1), nis, np.nan)
-    columns["log_likelihood"] = np.where(there.any(1), log_likelihood, 0.0)
-    return pd.DataFrame(columns)
+        columns |= {f"{name}_mean": followed.mean[:, i], f"{name}_variance": followed.variance[:, i]}
+    columns |= {f"{name}_innovation": followed.innovation[:, r] for r, name in enumerate(names)}
+    return pd.DataFrame(columns | {"nis": followed.nis, "log_likelihood": followed.log_likelihood})
+
+
+def _keys(key: Any, count: int) -> tuple[Any, Any, Any]:
+    """The key of the start, and those of the predictions and of the updates: (T,) each."""
+    import jax
+
+    keys = jax.random.split(jax.random.key(0) if key is None else key, 2 * count + 1)
+    return keys[0], keys[1::2], keys[2::2]
+
+
+def _altered(f: Filter, info: UpdateInfo) -> Any:
+    """Whether an entry was clipped, the guard replaced the update, or the innovation's covariance is none."""
+    import jax.numpy as jnp
+
+    z, S = info.innovation, info.innovation_cov
+    altered = info.guarded | jnp.isnan(jnp.linalg.cholesky(S)).any()
+    return altered if f.limiter is None else altered | jnp.any(z * z > f.limiter**2 * jnp.diagonal(S))
 
 
 def _checked(f: Filter, times: Any, y: Any, t0: Any) -> tuple[Any, Any]:
@@ -70,6 +132,8 @@ def _checked(f: Filter, times: Any, y: Any, t0: Any) -> tuple[Any, Any]:
         raise ConfigError(
             f"{f.name}: filter_data takes measurements at discrete times, the system's are continuous"
         )
+    if f.history is not None:
+        raise ConfigError(f"{f.name}: does not say what it expects of a measurement before it comes")
     if y.ndim == 1 and m == 1:
         y = y[:, None]
     if times.ndim != 1 or not len(times):

@@ -36,11 +36,37 @@ def test_yaml_blocks_are_valid_experiments(tmp_path, text):
     assert experiment.question.endswith("?")
 
 
+def test_the_data_block_goes_through_the_filters_of_the_file_above_it(tmp_path):
+    from typer.testing import CliRunner
+
+    from nlbench.cli.app import app
+
+    (data,) = blocks("csv")
+    (text,) = [text for text in blocks("yaml") if "my-oscillator" in text]
+    (tmp_path / "FILE").write_text(text)
+    (tmp_path / "DATA").write_text(data)
+    (command,) = re.findall(r"`nlbench (filter FILE DATA [^`]*)`", README)
+    files = {"FILE", "DATA", "estimates.csv"}
+    done = CliRunner().invoke(
+        app, [str(tmp_path / word) if word in files else word for word in command.split()]
+    )
+    assert done.exit_code == 0, done.stderr
+    rows = (tmp_path / "estimates.csv").read_text().splitlines()
+    assert len(rows) == 1 + 2 * (len(data.splitlines()) - 1)
+    assert "position_innovation,velocity_innovation,nis,log_likelihood" in rows[0]
+
+
+def test_every_system_is_named():
+    from nlbench import systems
+
+    assert [name for name in systems.available() if f"`{name}`" not in README] == []
+
+
 def test_commands_that_are_mentioned_exist():
     from typer.main import get_command
 
     from nlbench.cli.app import app
 
     mentioned = set(re.findall(r"nlbench ([a-z]+) (?:FILE|filters)", README))
-    assert mentioned == {"validate", "plan", "run", "replay", "list"}
+    assert mentioned == {"validate", "plan", "run", "replay", "filter", "list"}
     assert mentioned <= set(get_command(app).commands)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import nlbench as nb
 from nlbench.errors import ConfigError
+from nlbench.filters import data
 
 START = nb.Moments([1.0, 0.5], [[0.5, 0.1], [0.1, 0.3]])
 
@@ -116,3 +118,62 @@ def test_data_that_do_not_fit_are_refused(times, y, says):
 def test_a_time_between_steps_is_refused():
     with pytest.raises(ConfigError, match="step numbers"):
         nb.filter_data(nb.filters.build("kalman", walk()), [0.5], [1.0])
+
+
+def test_measurements_may_be_named():
+    f = nb.filters.build("ekf", pendulum())
+    columns = nb.filter_data(f, TIMES, Y, measurements=["angle", "rate"]).columns
+    assert {"angle_innovation", "rate_innovation"} <= set(columns)
+    with pytest.raises(ConfigError, match="expected 2 different names, got angle"):
+        nb.filter_data(f, TIMES, Y, measurements=["angle"])
+
+
+def test_what_is_no_fair_sample_of_nis_is_marked():
+    """Clipped by the limiter, judged by the predicted deviation of each entry; a row unmeasured is never altered."""
+    f = nb.filters.build("second-order", pendulum(), limiter=1.0)
+    followed = data.follow(f, TIMES, Y + 100 * (np.arange(5) == 3)[:, None])
+    state, before, clipped = f.init(START), 0.0, []
+    for t, y in zip(TIMES, Y + 100 * (np.arange(5) == 3)[:, None], strict=True):
+        state, info = f.update(f.predict(state, before, t), t, y)
+        bound, before = np.sqrt(np.diag(info.innovation_cov)), t
+        clipped.append(bool((np.abs(info.innovation) > bound).any()))
+    assert followed.altered.tolist() == clipped
+    assert clipped[3]
+    assert not clipped[2]
+    assert followed.taken.tolist() == [2, 1, 0, 2, 2]
+
+
+def test_ten_thousand_rows_take_one_compilation():
+    traces = []
+
+    def drift(t, x):
+        traces.append(t)
+        return -x
+
+    f = nb.filters.build(
+        "ekf", nb.System(drift, lambda t, x: x, [[1.0]], nb.Moments([1.0], [[1.0]]), step=0.1)
+    )
+    counts = []
+    for rows in (10, 10_000):
+        traces.clear()
+        table = nb.filter_data(f, 0.1 * np.arange(rows), np.ones(rows))
+        assert len(table) == rows
+        counts.append(len(traces))
+    assert counts[0] == counts[1]
+
+
+def test_no_random_number_serves_twice():
+    """What the start, each prediction and each update draw, of a filter that only draws."""
+    f = nb.filters.build("kalman", walk())
+    drawing = f._replace(
+        init=lambda moments, key: jax.random.normal(key, (1,)),
+        predict=lambda state, t0, t1, key: jax.random.normal(key, (1,)),
+        update=lambda state, t, y, key: (
+            state,
+            f.update(f.init(f.system.initial), t, y)[1]._replace(innovation=jax.random.normal(key, (1,))),
+        ),
+        moments=lambda state: nb.Moments(state, jnp.eye(1)),
+    )
+    followed = data.follow(drawing, np.arange(1, 6), np.ones(5))
+    drawn = np.concatenate([followed.mean[:, 0], followed.innovation[:, 0]])
+    assert len(set(drawn)) == 10
