@@ -18,6 +18,7 @@ from nlbench.engine.problem import overridden
 from nlbench.errors import ConfigError, Problem
 from nlbench.filters import data
 from nlbench.statistics.chi_square import quantile
+from nlbench.statistics.consistency import TAIL
 from nlbench.systems.system import kind
 
 if TYPE_CHECKING:
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from nlbench.config import Experiment
     from nlbench.config.recording import Recording
     from nlbench.filters.filter import Filter
-
-TAIL = 0.025
 
 
 class Foretold(NamedTuple):

@@ -24,6 +24,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from nlbench.moments.moments import Moments
+from nlbench.systems.exact import ZakaiGrid
 from nlbench.systems.system import Coordinate, Sampling, System
 
 SUMMARY = "two scalar systems with continuous measurements (Schwartz 1967, chapter 5)"
@@ -117,8 +118,23 @@ def _system(
         clip=(5.0,),
         step=0.001,
         sampling=Sampling(samples.period, samples.mode == "hold") if samples else None,
+        exact=_grid(parameters.dynamics, process_psd, measurement_psd, variance) if noisy else None,
         **more,
     )
+
+
+def _grid(dynamics: str, process_psd: float, measurement_psd: float, variance: float) -> ZakaiGrid:
+    """As wide as the state gets in 5 s; six cells in the standard deviation of a posterior of x + w, and so many that
+    noise crosses one faster than the drift, by four to one. Halving the spacing then moves no estimate by .1 % of the
+    RMS error."""
+    deviation = (process_psd * measurement_psd) ** 0.25
+    if dynamics == "D1":
+        reach = 6.5 * math.sqrt(variance + 5.0 * process_psd)
+        cells = max(12.0 * reach / deviation, 8.0 * reach / process_psd)
+    else:  # where the stationary density exp(-x^4/(2 q)) is e^-128 of its highest, or the initial one ends
+        reach = max(6.5 * math.sqrt(variance), 4.0 * process_psd**0.25)
+        cells = 12.0 * reach / deviation
+    return ZakaiGrid(-reach, reach, max(200, math.ceil(cells)))
 
 
 def _restoring(t: Any, x: Any) -> Any:
