@@ -9,6 +9,7 @@ from nlbench.config import consistency
 from nlbench.config.explain import Finding, found, plain, validated
 from nlbench.config.places import Path
 from nlbench.config.schema import (
+    REFERENCES,
     Claim,
     EngineSpec,
     Experiment,
@@ -65,7 +66,9 @@ def assemble(raw: Mapping[str, Any], question: str = "") -> tuple[Experiment | N
     filters = parts["filters"] = [
         _filter(each, ("filters", index), name, system, findings) for index, each in enumerate(entries)
     ]
-    labels = [_label(each) for each in entries] + ([head.reference] if head and head.reference else [])
+    labels = [_label(each) for each in entries] + (
+        [REFERENCES[head.reference]] if head and head.reference else []
+    )
     time = parts["time"] = _time(raw, system, discrete, findings)
     claims = parts["claims"] = _claims(raw, findings)
     reports = consistency.report_times(head, time)

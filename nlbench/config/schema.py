@@ -55,6 +55,11 @@ Name = Annotated[str, AfterValidator(_path_like)]
 Label = Annotated[str, Field(min_length=1, max_length=60), AfterValidator(_one_line)]
 
 
+# What a reference is called in tables: what it is made of, so that nobody takes samples for the exact posterior.
+PARTICLES = 10_000
+REFERENCES = {"exact": "exact", "particles": f"particles {PARTICLES:,}"}
+
+
 class Section(BaseModel):
     """A part of the experiment file: immutable, unknown keys refused."""
 
@@ -65,7 +70,10 @@ class Head(Section):
     """The keys at the top level that are not sections."""
 
     experiment: Name = Field(description="name, also the folder of the results")
-    reference: Literal["exact"] | None = Field(default=None, description="exact posterior beside the filters")
+    reference: Literal["exact", "particles"] | None = Field(
+        default=None,
+        description=f"beside the filters: the exact posterior, or a filter of {PARTICLES:,} particles",
+    )
     report_times: list[Positive] | None = Field(
         default=None,
         min_length=1,
@@ -209,7 +217,7 @@ class Experiment(Section):
     question: str = ""
     system: SystemSpec
     filters: list[FilterSpec]
-    reference: Literal["exact"] | None = None
+    reference: Literal["exact", "particles"] | None = None
     time: TimeSpec
     report_times: list[Positive]
     monte_carlo: MonteCarlo = MonteCarlo()
@@ -227,7 +235,13 @@ class Experiment(Section):
     @property
     def labels(self) -> tuple[str, ...]:
         """Labels of the filters in the order of the file; the reference, if any, is the last."""
-        return (*(each.label for each in self.filters), *([self.reference] if self.reference else []))
+        own = tuple(each.label for each in self.filters)
+        return own if self.reference_label is None else (*own, self.reference_label)
+
+    @property
+    def reference_label(self) -> str | None:
+        """What the reference is called; None without one."""
+        return REFERENCES[self.reference] if self.reference else None
 
     def layout_times(self) -> tuple[tuple[float, ...], tuple[int, ...]]:
         """The output times, 0 included, and the positions of the report times among them."""

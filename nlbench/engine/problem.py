@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from nlbench import filters, schedule, systems
+from nlbench.config.schema import PARTICLES
 from nlbench.errors import ConfigError
 from nlbench.moments.moments import Moments
 from nlbench.simulate import path
@@ -71,7 +72,7 @@ def make(experiment: Experiment, own: System | DiscreteSystem | None = None) -> 
         partial(_fitting, experiment, spec, own, truth, times) for spec in experiment.filters
     ]
     if experiment.reference is not None:
-        makers.append(partial(_reference, experiment.reference, truth, times))
+        makers.append(partial(_reference, experiment.reference, experiment.labels[-1], truth, times))
     runners = _all(makers)
     layout, block = _layout(experiment, stated), experiment.engine.block
     return Problem(truth, runners, times, layout, block, stated, _nominal_steps(truth, times))
@@ -116,10 +117,13 @@ def _nominal_steps(truth: System | DiscreteSystem, times: Schedule) -> tuple[int
     return tuple(int(step) + 1 for step in np.searchsorted(np.maximum.accumulate(angles), due))
 
 
-def _reference(name: str, truth: System | DiscreteSystem, times: Schedule) -> Runner:
-    """The exact posterior of what makes the data."""
+def _reference(name: str, label: str, truth: System | DiscreteSystem, times: Schedule) -> Runner:
+    """The posterior of what makes the data: exact, or a large particle filter's."""
     known = replace(_sampled(truth, times), exact=_roomy(truth.exact, times))
-    return _bound(name, name, known, {}, truth.initial, times)
+    if name == "particles":
+        options = {"particles": PARTICLES, "missing": False}
+        return _bound(label, "bootstrap", known, options, truth.initial, times)
+    return _bound(label, name, known, {}, truth.initial, times)
 
 
 def _roomy(exact: Any, times: Schedule) -> Any:

@@ -12,7 +12,7 @@ import numpy as np
 
 from nlbench import filters, systems
 from nlbench.config.consistency import MOST_STEPS
-from nlbench.config.schema import FilterSpec
+from nlbench.config.schema import PARTICLES, FilterSpec
 from nlbench.engine.compiled import use_cache
 from nlbench.engine.problem import overridden
 from nlbench.errors import ConfigError, Problem
@@ -130,10 +130,12 @@ def foretold(followed: data.Followed) -> Foretold:
 
 def _specs(experiment: Experiment) -> list[FilterSpec]:
     """The filters, and the reference, which believes in what makes the data."""
-    reference = experiment.reference
-    if reference is None:
+    label = experiment.reference_label
+    if label is None:
         return experiment.filters
-    return [*experiment.filters, FilterSpec(name=reference, label=reference, model=experiment.truth)]
+    large = experiment.reference == "particles"
+    name, options = ("bootstrap", {"particles": PARTICLES}) if large else ("exact", {})
+    return [*experiment.filters, FilterSpec(name=name, label=label, options=options, model=experiment.truth)]
 
 
 def _bound(experiment: Experiment, spec: FilterSpec) -> Filter:

@@ -71,7 +71,7 @@ def read(results: Results) -> Data:
     statistics = results.table("statistics")
     experiment = results.experiment
     filters = tuple(dict.fromkeys(statistics["filter"]))
-    reference = experiment.reference if experiment.reference in filters else None
+    reference = experiment.reference_label if experiment.reference_label in filters else None
     curves = _curves(statistics)
     return Data(
         filters=filters,

@@ -54,7 +54,7 @@ def build(parameters: Parameters) -> DiscreteSystem:
         diverged=_diverged,
         clip=(5.0,),
         interval=parameters.interval,
-        exact=PointMass((-60.0,), (60.0,), (481,)),  # a quarter of the least noise apart; tails are heavy
+        exact=PointMass((-60.0,), (60.0,), (241,)),  # half the least noise apart; tails are heavy
     )
 
 

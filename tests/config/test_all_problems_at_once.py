@@ -58,7 +58,11 @@ def test_a_missing_section_is_told_with_the_other_problems(tmp_path):
         ("runs: 20_000", "runs: '20000'", "found '20000'"),
         ("limiter: 3", "limiter: no", "filters.1.limiter: expected a number above 0 or null, found 'no'"),
         ("limiter: 3", "limter: 3", "filters.1.limter: unknown key; did you mean 'limiter'?"),
-        ("reference: exact", "reference: best", "reference: expected 'exact' or null, found 'best'"),
+        (
+            "reference: exact",
+            "reference: best",
+            "reference: expected 'exact' or 'particles' or null, found 'best'",
+        ),
         ("ensemble: matched", "ensemble: mached", "did you mean 'matched'?"),
         ("interval: 0.1", "intervall: 0.1", "system.intervall: unknown key; did you mean 'interval'?"),
         ("culver-scalar", "culver-scaler", "unknown system 'culver-scaler'; did you mean 'culver-scalar'?"),

@@ -69,7 +69,7 @@ def test_a_linear_system_moves_with_its_moments_to_second_order_in_the_spacing()
 
 def test_a_nonlinear_system_moves_with_second_order_in_the_spacing():
     """Against sixteen times as many cells as the coarsest grid, whose own error makes the last ratio 4.2."""
-    cubic = scalar(lambda t, x: x - x**3, lambda t, x: 0.5 + 0.1 * jnp.sin(x))
+    cubic = scalar(lambda t, x: x - x**3, lambda t, x: 0.5 + 0.1 * jnp.sin(x), initial=(0.3, 0.3))
 
     def moved(f):
         moments = f.moments(f.integrate(started(f), 0.0, 0.4, 1))
@@ -240,14 +240,17 @@ def test_the_cubic_sensor_is_a_large_particle_filter_within_its_standard_errors(
     assert np.abs(z).max() < 4, z
 
 
-@pytest.mark.parametrize(("dynamics", "measurement", "reach"), [("D1", "M11", 15.0), ("D2", "M21", 4.0)])
-def test_two_hundred_cells_are_enough_for_schwartz(dynamics, measurement, reach):
-    """The mean with 200 cells and with 800, after a second of noisy data, within a ten-thousandth of the spread."""
-    y = 100 * np.random.default_rng(7).normal(size=500)
-    system = schwartz(dynamics, measurement=measurement)
+@pytest.mark.parametrize(
+    ("dynamics", "measurement", "noise", "psd"),
+    [("D1", "M11", 1.0, 10.0), ("D1", "M12", 1.0, 0.1), ("D1", "M11", 0.25, 10.0), ("D2", "M21", 1.0, 0.1)],
+)
+def test_the_grid_of_schwartz_is_fine_enough(dynamics, measurement, noise, psd):
+    """With twice as many cells the mean, after half a second of data, moves by less than a thousandth of the spread."""
+    y = 1 + np.sqrt(psd / 0.001) * np.random.default_rng(7).normal(size=500)
+    system = schwartz(dynamics, measurement=measurement, process_psd=noise, measurement_psd=psd)
 
-    def ended(cells):
-        f = build(system, -reach, reach, cells)
+    def ended(lower, upper, cells):
+        f = build(system, lower, upper, cells)
 
         def step(state, value):
             return f.integrate(f.update(state, 0.0, value[None])[0], 0.0, 0.001, 1), None
@@ -255,7 +258,8 @@ def test_two_hundred_cells_are_enough_for_schwartz(dynamics, measurement, reach)
         moments = f.moments(jax.jit(lambda s: jax.lax.scan(step, s, jnp.asarray(y))[0])(started(f)))
         return moments.mean[0], np.sqrt(moments.cov[0, 0])
 
-    (mean, spread), (fine, _) = ended(200), ended(800)
+    lower, upper, cells = system.exact
+    (mean, spread), (fine, _) = ended(lower, upper, cells), ended(lower, upper, 2 * cells)
     assert abs(mean - fine) < 1e-3 * spread
 
 
@@ -265,7 +269,15 @@ def test_rates_are_the_slope_of_the_moments():
     ahead = f.moments(f.integrate(state, 0.0, h, 1))
     for rate, now, later in zip(f.rates(state, 0.0), f.moments(state), ahead, strict=True):
         np.testing.assert_allclose(rate, (later - now) / h, rtol=1e-3, atol=1e-4)
-    np.testing.assert_allclose(f.rates(state, 0.0).mean, [-RATE * 0.3], rtol=1e-3)
+
+
+def test_rates_are_those_of_the_system_to_second_order_in_the_spacing():
+    def slopes(f):
+        rates = f.rates(started(f), 0.0)
+        return np.array([rates.mean[0], rates.cov[0, 0]])
+
+    found = errors(LINEAR, (-7.0, 7.0), (70, 140), slopes, [-RATE * 0.3, -2 * RATE * 0.8 + SPECTRUM])
+    np.testing.assert_allclose(found[0] / found[1], 4.0, rtol=0.05)
 
 
 def test_a_missing_measurement_changes_nothing():
@@ -300,7 +312,11 @@ def test_probability_at_the_ends_of_the_grid_makes_everything_not_a_number():
 REFUSED = {
     "vanishes nowhere": (scalar(lambda t, x: -x, lambda t, x: x**2), (-5.0, 5.0, 101)),
     "one state with process noise": (nb.systems.build("culver-scalar"), (-5.0, 5.0, 100)),
-    "the prior has a standard deviation": (LINEAR, (-5.0, 5.0, 5)),
+    "the prior has a standard deviation": (
+        replace(LINEAR, initial=nb.Moments([0.3], [[1e-3]])),
+        (-5.0, 5.0, 100),
+    ),
+    "seems 372% larger than it is": (scalar(lambda t, x: 1 - x, lambda t, x: 0.02), (-5.0, 5.0, 100)),
     "measurements are continuous": (nb.systems.build("cubic-sensor"), (-10.0, 10.0, 100)),
 }
 

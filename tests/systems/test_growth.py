@@ -39,7 +39,7 @@ def test_published_values_are_the_defaults():
     np.testing.assert_array_equal(system.measurement_cov, [[1.0]])
     assert (system.interval, system.truth, system.states, system.measurements) == (1, None, 1, 1)
     assert (system.clip, [coordinate.name for coordinate in system.coordinates]) == ((20.0,), ["x"])
-    assert system.exact == ((-40.0,), (40.0,), (801,))
+    assert system.exact == ((-40.0,), (40.0,), (1201,))
 
 
 def test_parameters_reach_the_system():
