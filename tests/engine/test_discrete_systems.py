@@ -334,7 +334,7 @@ def test_a_truth_of_other_size_is_refused(tmp_path):
 
 
 def test_a_reference_of_particles_is_called_what_it_is_and_nears_the_exact_posterior(tmp_path):
-    """Of a linear system; a mean of 10,000 resampled particles is off by some 1.5 hundredths of the deviation, and so the
+    """Of a linear system; a mean of 10,000 resampled particles is off by some .015 of the deviation, and so the
     RMS error of 64 runs by 4 x .015 / sqrt(64) of itself at most."""
     results = run(scalar(), tmp_path, reference="particles", monte_carlo={"runs": 64, "seed": 3})
     kalman, particles = (statistic(results, label, "rms", "x") for label in ("ekf", "particles 10,000"))
