@@ -10,10 +10,12 @@ from typing import Any
 
 @contextmanager
 def terminated_like_interrupted() -> Iterator[None]:
-    """Forward SIGTERM to the handler that SIGINT has at that moment."""
+    """Forward SIGTERM to the handler that SIGINT has at that moment; where SIGINT is ignored, as in the background jobs
+    of a script, to the usual one."""
 
     def forward(number: int, frame: Any) -> None:
-        signal.raise_signal(signal.SIGINT)
+        handler = signal.getsignal(signal.SIGINT)
+        (handler if callable(handler) else signal.default_int_handler)(number, frame)
 
     try:
         before = signal.signal(signal.SIGTERM, forward)

@@ -17,7 +17,8 @@ from nlbench.moments.moments import Moments
 from nlbench.simulate import path
 from nlbench.statistics.layout import Layout
 from nlbench.systems.discrete import DiscreteSystem
-from nlbench.systems.system import Coordinate, InitialPosterior, Sets, System, kind
+from nlbench.systems.exact import InitialPosterior
+from nlbench.systems.system import Coordinate, Sets, System, kind
 
 if TYPE_CHECKING:
     from nlbench.config import Experiment, FilterSpec

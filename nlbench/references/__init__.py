@@ -27,7 +27,7 @@ def build(system: System | DiscreteSystem) -> Filter:
         zakai,
     )
     from nlbench.systems import exact
-    from nlbench.systems.system import InitialGrid, InitialPosterior, KalmanBank, kind
+    from nlbench.systems.system import kind
 
     if system.exact is None:
         raise ConfigError("exact: this system has no exact reference")
@@ -39,9 +39,9 @@ def build(system: System | DiscreteSystem) -> Filter:
     if isinstance(system.exact, exact.LinearGaussian):
         return linear_gaussian.build(system)
     builders = {
-        InitialGrid: initial_grid.build,
-        InitialPosterior: remembered.build,
-        KalmanBank: kalman_bank.build,
+        exact.InitialGrid: initial_grid.build,
+        exact.InitialPosterior: remembered.build,
+        exact.KalmanBank: kalman_bank.build,
         exact.ParameterBank: parameter_bank.build,
         exact.PointMass: point_mass.build,
         exact.ZakaiGrid: zakai.build,

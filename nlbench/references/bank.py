@@ -25,8 +25,7 @@ from nlbench.updates.kalman import kalman
 from nlbench.updates.measurement import gain
 
 if TYPE_CHECKING:
-    from nlbench.systems.exact import ParameterBank
-    from nlbench.systems.system import KalmanBank
+    from nlbench.systems.exact import KalmanBank, ParameterBank
     from nlbench.updates.measurement import Measurement
 
 

@@ -20,7 +20,8 @@ from nlbench.moments.moments import Components, Moments, dense, to_full
 from nlbench.references.sums import total as sum_over_nodes
 
 if TYPE_CHECKING:
-    from nlbench.systems.system import InitialGrid, System
+    from nlbench.systems.exact import InitialGrid
+    from nlbench.systems.system import System
 
 
 class State(NamedTuple):

@@ -26,7 +26,8 @@ from nlbench.updates.measurement import Measurement, linearise
 from nlbench.updates.posterior import through_gain
 
 if TYPE_CHECKING:
-    from nlbench.systems.system import KalmanBank, System
+    from nlbench.systems.exact import KalmanBank
+    from nlbench.systems.system import System
 
 
 def build(system: System, record: KalmanBank) -> Filter:

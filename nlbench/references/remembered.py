@@ -24,7 +24,8 @@ from nlbench.updates.kalman import kalman
 from nlbench.updates.measurement import gain, linearise
 
 if TYPE_CHECKING:
-    from nlbench.systems.system import InitialPosterior, System
+    from nlbench.systems.exact import InitialPosterior
+    from nlbench.systems.system import System
 
 KEY = 1969  # of the points' rotations, which are the same for all trajectories
 

@@ -27,7 +27,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from nlbench.moments.moments import Moments
 from nlbench.systems.ensembles import MATCHED_BOUND, MATCHED_DEVIATION, corrected, matched, normal_nodes
-from nlbench.systems.system import Coordinate, InitialGrid, Sets, System
+from nlbench.systems.exact import InitialGrid
+from nlbench.systems.system import Coordinate, Sets, System
 
 SUMMARY = "dx/dt = -2x + .7x^2 with noisy measurements of x (Culver 1969, chapter 7)"
 

@@ -37,7 +37,8 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from nlbench.systems.system import Coordinate, InitialPosterior, LateError, Sets, Sightings, System
+from nlbench.systems.exact import InitialPosterior
+from nlbench.systems.system import Coordinate, LateError, Sets, Sightings, System
 
 if TYPE_CHECKING:
     from nlbench.systems.lunar_geometry import Geometry

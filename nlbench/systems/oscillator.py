@@ -35,7 +35,8 @@ from nlbench.systems.ensembles import (
     matched,
     normal_nodes,
 )
-from nlbench.systems.system import Coordinate, KalmanBank, Sets, System
+from nlbench.systems.exact import KalmanBank
+from nlbench.systems.system import Coordinate, Sets, System
 
 SUMMARY = "a damped oscillator with unknown damping ratio (Culver 1969, section 8.2)"
 

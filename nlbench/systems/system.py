@@ -35,50 +35,6 @@ class Sets(NamedTuple):
     transform: Function
 
 
-class InitialGrid(NamedTuple):
-    """The exact posterior of a scalar system without process noise: a known map of a grid of initial conditions.
-
-    points: (p,). weights: (p,), prior probabilities. flow: (t, points) -> (p,) states, infinite where escaped.
-    """
-
-    points: Any
-    weights: Any
-    flow: Function
-
-
-class KalmanBank(NamedTuple):
-    """The exact posterior of a system whose last state is an unknown constant, and which is linear and Gaussian once
-    that constant is known: one Kalman filter for each of a grid of its values.
-
-    nodes: (p,) values of the last state. weights: (p,), prior probabilities.
-    mean: (k,), cov: (k, k): the other k = n - 1 states at the start, whatever the constant.
-    drift: (p, k, k), the matrix A of dx = A x dt + noise for each node. spectrum: (k, k), that of the noise, or None.
-    """
-
-    nodes: Any
-    weights: Any
-    mean: Any
-    cov: Any
-    drift: Any
-    spectrum: Any = None
-
-
-class InitialPosterior(NamedTuple):
-    """The nearly exact posterior of a system without process noise, with a normal prior: a density of the initial
-    state, by importance sampling.
-
-    flow: (t, x0) -> (n,), the motion in closed form. companion: the system whose linearised filter decides when the
-    reference makes a sighting; None means the system itself. most: how many measurements it can remember.
-    radii, turns: how many points are laid, as `nlbench.references.points` says.
-    """
-
-    flow: Function
-    companion: System | None = None
-    most: int = 64
-    radii: int = 5
-    turns: int = 2
-
-
 class Sightings(NamedTuple):
     """Measurements made at angles of a revolution, instead of at times.
 

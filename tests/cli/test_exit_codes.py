@@ -104,18 +104,22 @@ def test_an_internal_error_is_one_line_and_its_traceback_is_put_aside(tmp_path, 
     assert "Traceback" in kept.read_text()
 
 
-def test_sigterm_stops_a_run_like_ctrl_c(tmp_path, monkeypatch):
+@pytest.mark.parametrize("interrupts", [signal.default_int_handler, signal.SIG_IGN])
+def test_sigterm_stops_a_run_like_ctrl_c(tmp_path, monkeypatch, interrupts):
+    """Also where SIGINT is ignored, as shells have it for background jobs of a script."""
+
     def killed(*arguments, **options):
-        signal.raise_signal(
-            signal.SIGTERM
-        )  # to this thread: a signal to the process may reach another, later
+        signal.raise_signal(signal.SIGTERM)  # a signal to the process may reach another thread, later
         raise AssertionError("SIGTERM did not arrive")
 
     monkeypatch.setattr(engine, "run", killed)
-    before = signal.getsignal(signal.SIGTERM)
-    done = CliRunner().invoke(app, ["run", str(written(tmp_path, VALID))])
+    terminates, earlier = signal.getsignal(signal.SIGTERM), signal.signal(signal.SIGINT, interrupts)
+    try:
+        done = CliRunner().invoke(app, ["run", str(written(tmp_path, VALID))])
+    finally:
+        signal.signal(signal.SIGINT, earlier)
     assert done.exit_code == 130
-    assert signal.getsignal(signal.SIGTERM) is before
+    assert signal.getsignal(signal.SIGTERM) is terminates
 
 
 def test_python_m_nlbench_is_the_same_program(tmp_path):

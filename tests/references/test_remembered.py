@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 import nlbench as nb
-from nlbench.systems.system import InitialPosterior
+from nlbench.systems.exact import InitialPosterior
 from tests.oracle import kalman_update
 
 A = np.array([[0.0, 1.0], [-1.0, -0.3]])
@@ -111,6 +111,7 @@ def test_in_the_engine_it_is_the_linear_filter(tmp_path):
     assert len(one) > 80
 
 
+@pytest.mark.long
 def test_on_the_lunar_orbit_its_errors_are_what_it_says_they_are(tmp_path):
     """Joint NEES of 4 to 4 standard errors, and none of the filters does better in position."""
     results = nb.run(

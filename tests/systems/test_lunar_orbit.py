@@ -141,7 +141,9 @@ def test_cartesian_and_polar_filters_see_the_same_runs(tmp_path):
     assert kept.loc["polar"].range.std() > 1000.0
 
 
-@pytest.mark.parametrize("changes", [{"coordinates": "polar"}, {"sightings": False}])
+@pytest.mark.parametrize(
+    "changes", [{"coordinates": "polar"}, pytest.param({"sightings": False}, marks=pytest.mark.long)]
+)
 def test_the_reference_is_there_whatever_the_filters_coordinates_and_without_sightings(tmp_path, changes):
     results = run(tmp_path, system={"name": "lunar-orbit", **changes}, reference="exact")
     rms = results.table("statistics").query(
@@ -151,6 +153,7 @@ def test_the_reference_is_there_whatever_the_filters_coordinates_and_without_sig
     assert results.table("divergence").diverged.sum() == 0
 
 
+@pytest.mark.long
 def test_feet_and_nondimensional_units_give_the_same_statistics(tmp_path):
     """Lengths in initial radii, times in initial radii by initial speed; third-order filter, sightings."""
     filters = [

@@ -131,8 +131,8 @@ def test_azimuths_are_wrapped():
     np.testing.assert_allclose(build(radars=2).innovation(y, h), [4.0, 6.2 - 2 * math.pi, 0.4] * 2)
 
 
-@pytest.mark.parametrize("radars", [1, 2])
-@pytest.mark.parametrize("name", ["ekf", "sof-gaussian", "ukf"])
+@pytest.mark.parametrize("radars", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.parametrize("name", ["ekf", pytest.param("sof-gaussian", marks=pytest.mark.long), "ukf"])
 def test_filters_track_it(name, radars):
     system = build(radars=radars)
     states, seen = simulated(system, 20, 16, seed=1)
