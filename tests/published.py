@@ -10,10 +10,8 @@ from typing import Any
 
 import pandas as pd
 
-ROBUST = (
-    "rms_clipped",
-    "median_error",
-)  # of filters that diverge now and then, only these and the counts compare
+# Of filters that diverge now and then, only these and the counts compare.
+ROBUST = ("rms_clipped", "median_error")
 
 
 def published(stem: str) -> dict[str, Any]:

@@ -10,13 +10,8 @@ from typing import Any
 
 from nlbench import config
 
-STABLE = (
-    "statistics",
-    "moments",
-    "paired",
-    "divergence",
-    "runs",
-)  # cost is measured, so it is not among them
+# Cost is measured, so it is not among them.
+STABLE = ("statistics", "moments", "paired", "divergence", "consistency", "runs")
 
 
 def experiment(**changes: Any) -> config.Experiment:

@@ -98,9 +98,8 @@ def _seconds(programs: Sequence[Any], data: Simulated, blocks: int) -> list[floa
 
 
 def _timed(program: Any, data: Simulated, count: int) -> float:
-    jax.block_until_ready(
-        program(data, np.int32(1))
-    )  # not timed: it finds another program's data in the caches
+    # Not timed: it finds another program's data in the caches.
+    jax.block_until_ready(program(data, np.int32(1)))
     begun = time.perf_counter()
     jax.block_until_ready(program(data, np.int32(count)))
     return time.perf_counter() - begun

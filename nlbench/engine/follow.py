@@ -138,9 +138,8 @@ def joined(filter: Filter, schedule: Schedule, start: Any, outputs: Any, end: An
 def _stacked(components: Any) -> Any:
     """Mean, covariance and third moment in one first axis."""
     carried = [tensor for tensor in components[:3] if tensor is not None]
-    return jnp.stack(
-        [entry for tensor in carried for entry in tensor]
-    )  # inside the vmap it would be transposed
+    # Not inside the vmap, where it would be transposed.
+    return jnp.stack([entry for tensor in carried for entry in tensor])
 
 
 def over_lanes(function: Any) -> Any:

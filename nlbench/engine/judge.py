@@ -41,9 +41,8 @@ def judge(
 
     rules: the system whose rules of divergence hold. model: the filter's, which says what the errors of its state are.
     """
-    each = jax.vmap(
-        jax.vmap(lambda x, given: _one(rules, model, x, given))
-    )  # of scalars: arrays inside would be transposed
+    # Of scalars: arrays inside would be transposed.
+    each = jax.vmap(jax.vmap(lambda x, given: _one(rules, model, x, given)))
     apart = each(_apart(states), _apart(components))
     error, cov, third = (jnp.stack(part, axis=1) for part in apart[:3])
     return Judged(

@@ -28,9 +28,8 @@ def _solved(probability: float, k: np.ndarray) -> np.ndarray:
         x = k * y**3
         log_density = (a - 1) * np.log(x / 2) - x / 2 - _log_gamma(a) - math.log(2)
         step = (lower_gamma(a, x / 2) - probability) / (np.exp(log_density) * 3 * k * y**2)
-        new = np.clip(
-            y - step, y / 4, y * 4
-        )  # the first steps of few degrees could leave the positive numbers
+        # The first steps of few degrees could leave the positive numbers.
+        new = np.clip(y - step, y / 4, y * 4)
         done, y = np.abs(new - y) <= TOLERANCE * y, new
         if done.all():
             break

@@ -91,9 +91,8 @@ class Totals:
             self.pivot[:, fresh] = mean[block][:, fresh]
             self._pivot_set |= fresh
         shift = np.where(alive[:, None] > 0, mean - self.pivot, 0.0)
-        about = np.zeros(
-            (7, len(mean), *power.shape[2:])
-        )  # sums of d^0 ... d^6; that of d is zero about the mean
+        # Sums of d^0 ... d^6; that of d is zero about the mean.
+        about = np.zeros((7, len(mean), *power.shape[2:]))
         about[0], about[2:] = alive, np.moveaxis(power, 1, 0)
         first = alive[:, None] * shift[:, 1:]
         cross = self._move_cross(sums, shift[:, 0][:, :, self._reports], alive[:, :, self._reports])

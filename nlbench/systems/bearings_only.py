@@ -95,9 +95,8 @@ def _turning(k: Any, x: Any, w: Any) -> Any:
 
     due = sum(((k >= first - 1) & (k < last)) * 1.0 for first, last in TURNS)
     angle = due * (TURN_RATE + w[0]) * STEP
-    chord = (
-        jnp.sinc(angle / (2 * math.pi)) * STEP
-    )  # per unit speed, half the angle to the right of the velocity
+    # Per unit speed, half the angle to the right of the velocity.
+    chord = jnp.sinc(angle / (2 * math.pi)) * STEP
     return jnp.concatenate([x[:2] + chord * _turned(x[2:], angle / 2), _turned(x[2:], angle)])
 
 

@@ -41,11 +41,8 @@ MU = 3.986004418e14  # m^3/s^2
 EARTH = 6.371e6  # m
 TURNING = 7.2921159e-5  # rad/s, of the earth
 HEIGHT = 700e3  # m
-INCLINATION, NODE, ARGUMENT = (
-    98.0,
-    15.0,
-    28.0,
-)  # degrees: the node's longitude, and the place on the orbit from there
+# Degrees: of the orbit; of the node's longitude; and of the place on the orbit from there.
+INCLINATION, NODE, ARGUMENT = 98.0, 15.0, 28.0
 RADARS = ((42.6, 0.0), (38.0, 10.0))  # latitude, and longitude from the x axis at step 0, degrees
 LOST = 200e3  # m
 
