@@ -99,5 +99,5 @@ def test_the_exact_posterior_agrees_with_an_independent_grid(group, tmp_path):
     }
     assert_agrees(table, {"grid": "exact"}, {"grid": errors}, ("grid",))
     nees = table.query("filter == 'exact' and statistic == 'nees' and coordinate == 'all' and time != '0.0'")
-    assert len(nees) == 51
+    assert len(nees) == 50
     assert (abs(nees.value - 1) < 4 * nees.stderr).all()
