@@ -32,7 +32,7 @@ ALLOWED: dict[str, set[str]] = {
     "moments": {"algebra"},
     "updates": {"algebra", "moments"},
     "systems.system": set(),
-    "systems.discrete": set(),
+    "systems.discrete": {"systems.system"},
     "systems.exact": set(),
     "systems": {
         "systems.system",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+
+from nlbench.systems.system import ErrorRules
 
 if TYPE_CHECKING:
     from nlbench.moments.moments import Moments
-    from nlbench.systems.system import Coordinate, LateError
 
 Function = Callable[..., Any]
 
@@ -23,7 +24,7 @@ def step_index(k: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class DiscreteSystem:
+class DiscreteSystem(ErrorRules):
     """A system x(k+1) = f(k, x(k), w), y(k) = h(k, x(k), v), with w ~ N(0, Q) and v ~ N(0, R) independent.
 
     Time is the step index k, an integer: `predict` from k to k + 1 applies the transition once. Additive noise, x + w,
@@ -36,16 +37,11 @@ class DiscreteSystem:
     truth: another system that makes the data, when truth and filter model differ.
     sample: key -> (n,) draws an initial state.
     residual: (y, h) -> (m,), y - h unless given (to wrap an angle, say).
-    coordinates: names and units of the errors; default x1 ... xn (x for one state).
-    error: (x, m) -> (c,) errors, true state minus estimate m of this system's state; default x - m.
-    diverged: (c,) errors -> bool; default: never, apart from errors that are not finite.
-    diverged_stays: whether a run diverged at a report time counts as diverged ever after.
-    diverged_late: a rule that is judged once, at the end of a run.
-    clip: (c,) bound on |error| in `rms_clipped`; default infinite.
     inputs: k -> known inputs u(k), then transition takes (k, x, w, u).
     interval: steps between measurements, the first at step `interval`; None means that nothing is measured.
     exact: what the exact reference is made of, where there is one.
-    norms: named norms of the errors, each with the coordinates that it joins.
+
+    How its errors are named and judged: `ErrorRules`, by keyword.
     """
 
     transition: Function
@@ -56,16 +52,9 @@ class DiscreteSystem:
     truth: DiscreteSystem | None = None
     sample: Function | None = None
     residual: Function | None = None
-    coordinates: tuple[Coordinate, ...] | None = None
-    error: Function | None = None
-    diverged: Function | None = None
-    diverged_stays: bool = False
-    diverged_late: LateError | None = None
-    clip: tuple[float, ...] | None = None
     inputs: Function | None = None
     interval: int | None = 1
     exact: Any = None
-    norms: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     @property
     def states(self) -> int:

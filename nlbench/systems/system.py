@@ -91,8 +91,30 @@ class LateError(NamedTuple):
     members: tuple[int, ...]
 
 
+@dataclass(frozen=True, kw_only=True)
+class ErrorRules:
+    """How the errors of a system's estimates are named, and when a run has diverged, in whatever time.
+
+    coordinates: names and units of the errors; default x1 ... xn (x for one state).
+    error: (x, m) -> (c,) errors, true state minus estimate m of this system's state; default x - m.
+    diverged: (c,) errors -> bool; default: never, apart from errors that are not finite.
+    diverged_stays: whether a run diverged at a report time counts as diverged ever after.
+    diverged_late: a rule that is judged once, at the end of a run.
+    clip: (c,) bound on |error| in `rms_clipped`; default infinite.
+    norms: named norms of the errors, each with the coordinates that it joins.
+    """
+
+    coordinates: tuple[Coordinate, ...] | None = None
+    error: Function | None = None
+    diverged: Function | None = None
+    diverged_stays: bool = False
+    diverged_late: LateError | None = None
+    clip: tuple[float, ...] | None = None
+    norms: dict[str, tuple[int, ...]] = field(default_factory=dict)
+
+
 @dataclass(frozen=True)
-class System:
+class System(ErrorRules):
     """A continuous-time system dx = f dt + G dw, measured at discrete times or continuously.
 
     Shapes are those of one trajectory: n states, m measurements, s noises.
@@ -107,19 +129,14 @@ class System:
     truth: another system that makes the data, when truth and filter model differ.
     sample: key -> (n,) draws an initial state; or `Sets`, when initial states are drawn in sets.
     residual: (y, h) -> (m,), y - h unless given (to wrap an angle, say).
-    coordinates: names and units of the errors; default x1 ... xn (x for one state).
-    error: (x, m) -> (c,) errors, true state minus estimate m of this system's state; default x - m.
-    diverged: (c,) errors -> bool; default: never, apart from errors that are not finite.
-    diverged_stays: whether a run diverged at a report time counts as diverged ever after.
-    diverged_late: a rule that is judged once, at the end of a run.
-    clip: (c,) bound on |error| in `rms_clipped`; default infinite.
     inputs: t -> known inputs u(t), then drift takes (t, x, u).
     step: default integration step; None means a tenth of the interval.
     interval: time between measurements; None means that nothing is measured, or only by sightings.
     sampling: how continuous measurements are sampled; None means that filters see all of them.
     sightings: measurements that wait for an angle; `observe` then serves where no sighting's number is given.
     exact: what the exact reference is made of, where there is one.
-    norms: named norms of the errors, each with the coordinates that it joins.
+
+    How its errors are named and judged: `ErrorRules`, by keyword.
     """
 
     drift: Function
@@ -132,19 +149,12 @@ class System:
     truth: System | None = None
     sample: Function | Sets | None = None
     residual: Function | None = None
-    coordinates: tuple[Coordinate, ...] | None = None
-    error: Function | None = None
-    diverged: Function | None = None
-    diverged_stays: bool = False
-    diverged_late: LateError | None = None
-    clip: tuple[float, ...] | None = None
     inputs: Function | None = None
     step: float | None = None
     interval: float | None = None
     sampling: Sampling | None = None
     sightings: Sightings | None = None
     exact: Any = None
-    norms: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     @property
     def states(self) -> int:
