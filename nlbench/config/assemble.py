@@ -6,20 +6,19 @@ from collections.abc import Mapping
 from typing import Any
 
 from nlbench.config import consistency
+from nlbench.config.claim import Claim
 from nlbench.config.explain import Finding, found, plain, validated
+from nlbench.config.fields import Label, Section
 from nlbench.config.places import Path
 from nlbench.config.schema import (
     REFERENCES,
-    Claim,
     EngineSpec,
     Experiment,
     FilterSpec,
     Head,
     Initial,
-    Label,
     Limits,
     MonteCarlo,
-    Section,
     Source,
     SystemSpec,
     TimeSpec,
@@ -75,7 +74,7 @@ def assemble(raw: Mapping[str, Any], question: str = "") -> tuple[Experiment | N
     findings += consistency.times(time, reports, system, filters, parts["truth"])
     findings += consistency.steps(filters) if discrete else []
     findings += consistency.labels(labels, len(entries))
-    findings += consistency.claims(claims, labels, reports)
+    findings += consistency.claims(claims, labels, reports, parts["source"])
     findings += consistency.traces(head, parts["monte_carlo"])
     if findings or head is None or reports is None:
         return None, findings

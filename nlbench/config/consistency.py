@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from nlbench.config.claim import FORMS, Claim
 from nlbench.config.explain import Finding
-from nlbench.config.schema import Claim, FilterSpec, Head, MonteCarlo, SystemSpec, TimeSpec
+from nlbench.config.schema import FilterSpec, Head, MonteCarlo, Source, SystemSpec, TimeSpec
 from nlbench.suggestions import suggestion
 
 MOST_OUTPUTS = 100_000
@@ -108,9 +109,12 @@ def labels(labels: Sequence[str | None], filters: int) -> list[Finding]:
 
 
 def claims(
-    claims: Sequence[Claim | None], labels: Sequence[str | None], reports: Sequence[float] | None
+    claims: Sequence[Claim | None],
+    labels: Sequence[str | None],
+    reports: Sequence[float] | None,
+    source: Source | None,
 ) -> list[Finding]:
-    """Claims name filters and times of this experiment; labels are judged only when every one is known."""
+    """Claims name filters, times and figures of this experiment; labels are judged only when every one is known."""
     findings = []
     ids: dict[str, int] = {}
     known = [label for label in labels if label]
@@ -122,12 +126,19 @@ def claims(
                 Finding(("claims", index, "id"), f"'{each.id}' is already the id of claims.{ids[each.id]}")
             )
         ids.setdefault(each.id, index)
-        for position, label in enumerate(each.less):
-            at = ("claims", index, "less", position)
+        form = next(key for key in FORMS if getattr(each, key) is not None)
+        for position, label in enumerate(each.labels):
+            at = ("claims", index, form, position)
             if known and None not in labels and label not in known:
                 findings.append(Finding(at, f"no filter is labelled '{label}'{suggestion(label, known)}"))
-            elif label in each.less[:position]:
+            elif label in each.labels[:position]:
                 findings.append(Finding(at, f"'{label}' stands twice in this claim"))
+        numbers = [*source.figures, *source.tables] if source else each.figures or []
+        for position, number in enumerate(each.figures or []):
+            if number not in numbers:
+                of = f"source ({', '.join(numbers)})" if numbers else "source, which names none"
+                message = f"'{number}' is not one of the figures and tables of {of}"
+                findings.append(Finding(("claims", index, "figures", position), message))
         for position, time in enumerate(each.at):
             if reports is not None and not any(
                 math.isclose(time, report, rel_tol=1e-9) for report in reports

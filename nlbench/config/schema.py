@@ -2,68 +2,35 @@
 
 from __future__ import annotations
 
-import re
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from nlbench.config.claim import Claim
+from nlbench.config.fields import Bound, Finite, Fraction, Label, Name, Positive, RunNumber, Section
 from nlbench.config.identity import canonical_hash, to_yaml
 
 LARGEST = 2**63 - 1
-STEM = re.compile(r"[a-z0-9][a-z0-9_.-]*")
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Fraction = Annotated[float, Field(ge=0, le=1)]
-RunNumber = Annotated[int, Field(ge=0)]
-Statistic = Literal[
+# Sections that say how results are read and shown, not what is computed.
+READ = ("claims", "source", "figures", "traces")
+Figure = Literal[
     "rms",
     "rms_clipped",
-    "median_error",
     "mean_error",
-    "variance_estimated",
-    "variance_actual",
-    "third_estimated",
-    "third_actual",
+    "variance",
+    "third_moment",
     "nees",
-    "coverage_95",
-    "nis",
-    "log_likelihood",
+    "divergence",
+    "trace",
+    "density",
+    "response",
+    "cost",
+    "final",
 ]
-Figure = Literal[
-    "rms", "rms_clipped", "mean_error", "variance", "third_moment", "nees", "divergence", "trace"
-]
-
-Bound = Literal["cramer-rao"]
-
-
-def _path_like(name: str) -> str:
-    """A name that is safe as a folder below the results: no way out of it, and nothing hidden in it."""
-    safe = all(STEM.fullmatch(part) and not part.endswith(".") for part in name.split("/"))
-    if not safe or len(name) > 100:
-        allowed = "parts of a-z 0-9 - _ . with / between them"
-        raise ValueError(f"expected a name such as 'culver/hermite-01' ({allowed}), found {name[:60]!r}")
-    return name
-
-
-def _one_line(text: str) -> str:
-    if not text.isprintable() or text != text.strip():
-        raise ValueError(f"expected one line of printable text without spaces around it, found {text[:60]!r}")
-    return text
-
-
-Name = Annotated[str, AfterValidator(_path_like)]
-Label = Annotated[str, Field(min_length=1, max_length=60), AfterValidator(_one_line)]
-
 
 # What a reference is called in tables: what it is made of, so that nobody takes samples for the exact posterior.
 PARTICLES = 10_000
 REFERENCES = {"exact": "exact", "particles": f"particles {PARTICLES:,}"}
-
-
-class Section(BaseModel):
-    """A part of the experiment file: immutable, unknown keys refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Head(Section):
@@ -182,17 +149,6 @@ class Source(Section):
     runs: int | None = Field(default=None, ge=1, description="the source's number of runs")
 
 
-class Claim(Section):
-    """An ordering that a statistic is expected to show: each label's value is less than the next one's."""
-
-    id: Label
-    says: str
-    statistic: Statistic
-    less: list[str] = Field(min_length=2)
-    at: list[Positive] = Field(default_factory=list, description="report times; default: all")
-    coordinate: str | None = Field(default=None, description="default: the first")
-
-
 class EngineSpec(Section):
     """How the runs are computed. Only block and precision can change a digit of the results."""
 
@@ -256,6 +212,7 @@ class Experiment(Section):
         for each in plain["filters"]:
             beliefs = {key: value for key in ("model", "initial") if (value := each.pop(key))}
             each.update(each.pop("options"), **beliefs)
+        plain["claims"] = [claim.model_dump(mode="json", exclude_none=True) for claim in self.claims]
         return plain
 
     def resolved_yaml(self) -> str:
@@ -263,8 +220,7 @@ class Experiment(Section):
         return to_yaml(self.resolved(), self.question)
 
     def hash12(self) -> str:
-        """Identifies results that may be mixed: all counts but how many runs, which are traced, and how computed."""
+        """Identifies results that may be mixed: all counts but how many runs, how they are computed, and how read."""
         plain = self.resolved()
         del plain["monte_carlo"]["runs"], plain["engine"]["chunk"], plain["engine"]["threads"]
-        del plain["traces"]
-        return canonical_hash(plain)
+        return canonical_hash({key: value for key, value in plain.items() if key not in READ})

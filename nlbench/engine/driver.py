@@ -13,7 +13,7 @@ from nlbench import runtime
 from nlbench.config.schema import SystemSpec
 from nlbench.engine.bounds import bounds_table
 from nlbench.engine.compiled import CAPACITY, Compiled, compile_chunks
-from nlbench.engine.finish import up_to_date, write
+from nlbench.engine.finish import read_anew, traced, write
 from nlbench.engine.interruption import stop_requests
 from nlbench.engine.problem import make
 from nlbench.engine.resume import checkpoint, finished_runs, resumed, sound
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 SECONDS_BETWEEN_CHECKPOINTS = 5.0
+CHECKPOINT_SHARE = 30  # ... or more, so that writing large ones takes a thirtieth of the time
 
 
 def run(
@@ -58,7 +59,8 @@ def _run(
     with folder.locked():
         done = finished_runs(folder)
         runs = max(experiment.monte_carlo.runs, done or 0)
-        if done == runs and sound(folder) and up_to_date(folder, experiment):
+        if done == runs and sound(folder) and traced(folder, experiment):
+            read_anew(folder, experiment)
             return Results(folder.path)
         begun = time.perf_counter()
         bounds = bounds_table(problem, experiment.monte_carlo.seed) if experiment.bounds else None
@@ -96,12 +98,15 @@ def _compute(
     whole, rest = divmod(runs, block)
     saved, saved_at = totals.blocks, time.monotonic()
     progress(totals.runs, runs)
+    pause = SECONDS_BETWEEN_CHECKPOINTS
     for first, sums in _in_order(compiled, totals.blocks, whole, runs, threads, chunk, stopped):
         totals.add(first, sums)
         progress(totals.runs, runs)
-        if time.monotonic() - saved_at > SECONDS_BETWEEN_CHECKPOINTS:
+        begun = time.monotonic()
+        if begun - saved_at > pause:
             checkpoint(folder, compiled, totals)
             saved, saved_at = totals.blocks, time.monotonic()
+            pause = max(pause, CHECKPOINT_SHARE * (saved_at - begun))
     if totals.blocks != saved:
         checkpoint(folder, compiled, totals)
     if stopped():

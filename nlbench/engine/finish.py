@@ -1,20 +1,22 @@
-"""The end of a run: tables, claims, traces, costs and the manifest."""
+"""The end of a run: tables, claims, traces, costs and the manifest; and reading finished tables by other claims."""
 
 from __future__ import annotations
 
 import datetime
+import math
 from typing import TYPE_CHECKING
 
 from nlbench.engine.compiled import Compiled
 from nlbench.engine.cost import cost_table
 from nlbench.engine.resume import device, numerics
-from nlbench.engine.trace import traces
+from nlbench.engine.trace import traced as traced_runs
 from nlbench.results.atomic import remove
 from nlbench.results.folder import TABLES, RunFolder
 from nlbench.results.manifest import commit, versions
 from nlbench.results.results import Results
-from nlbench.statistics.claims import evaluate
+from nlbench.statistics.claims import judged
 from nlbench.statistics.consistency import consistency_table
+from nlbench.statistics.sets import KeptTable
 from nlbench.statistics.summary import tables
 from nlbench.statistics.totals import Totals
 
@@ -23,10 +25,48 @@ if TYPE_CHECKING:
 
     from nlbench.config import Experiment
 
+OWN_FACTS = ("schema", "checksums", "runs")  # of a manifest: what writing it adds
 
-def up_to_date(folder: RunFolder, experiment: Experiment) -> bool:
+
+def traced(folder: RunFolder, experiment: Experiment) -> bool:
     """Whether the traces of a finished run are those asked for, which may change without changing its hash."""
     return Results(folder.path).experiment.traces == experiment.traces
+
+
+def read_anew(folder: RunFolder, experiment: Experiment) -> None:
+    """Judge a finished run anew from its tables where its claims, or what else says how to read it, have changed."""
+    results = Results(folder.path)
+    saved = results.experiment
+    experiment = experiment.model_copy(update={"monte_carlo": saved.monte_carlo, "engine": saved.engine})
+    if saved == experiment:
+        return
+    made = {name: results.table(name) for name in results.tables}
+    facts = {key: value for key, value in results.manifest.items() if key not in OWN_FACTS}
+    clip = {name: math.inf if bound is None else bound for name, bound in facts["clip"].items()}
+    folder.reopen()
+    folder.write_experiment(experiment.resolved_yaml())
+    _remove(folder, "claims", "sets")
+    folder.write_tables(_judged(experiment, made, clip, facts["norms"]))
+    folder.finish(results.manifest["runs"], **facts)
+
+
+def _judged(
+    experiment: Experiment,
+    tables: dict[str, pd.DataFrame],
+    clip: dict[str, float],
+    norms: dict[str, list[str]],
+) -> dict[str, pd.DataFrame]:
+    """The tables of claims, if there are claims."""
+    if not experiment.claims:
+        return {}
+    return judged(experiment.claims, tables, KeptTable(tables["runs"], clip, norms), experiment.source.runs)
+
+
+def _remove(folder: RunFolder, *names: str) -> None:
+    """Remove tables that the run no longer has."""
+    for name in names:
+        for left in (folder.path / TABLES).glob(f"{name}.*"):
+            remove(left)
 
 
 def write(
@@ -44,13 +84,14 @@ def write(
     made["consistency"] = consistency_table(totals, made["statistics"], problem.truth.measurements)
     if bounds is not None:
         made["bounds"] = bounds
-    if experiment.claims:
-        made["claims"] = evaluate(experiment.claims, made["statistics"], made["paired"])
+    layout = problem.layout
+    clip = dict(zip(layout.magnitudes, layout.magnitude_clip, strict=True))
+    norms = {name: [layout.coordinates[i] for i in members] for name, members in layout.norms.items()}
+    made |= _judged(experiment, made, clip, norms)
     if experiment.traces:
-        made["traces"] = traces(compiled, experiment.traces, threads)
+        made |= traced_runs(compiled, experiment.traces, threads)
     made["cost"] = cost_table(problem, experiment.monte_carlo.seed)
-    for left in (folder.path / TABLES).glob("traces.*"):  # of runs that are no longer traced
-        remove(left)
+    _remove(folder, "traces", "responses", "claims", "sets")
     folder.write_tables(made)
     folder.finish(
         totals.runs,
@@ -60,7 +101,9 @@ def write(
         block=problem.block,
         precision=experiment.engine.precision,
         threads=threads,
-        units=problem.layout.magnitude_units,
+        units=layout.magnitude_units,
+        clip={name: bound if math.isfinite(bound) else None for name, bound in clip.items()},
+        norms=norms,
         versions=versions(),
         commit=commit(),
         device=device(),

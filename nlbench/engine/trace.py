@@ -21,8 +21,11 @@ if TYPE_CHECKING:
     from nlbench.engine.block import View
     from nlbench.engine.compiled import Compiled
     from nlbench.engine.problem import Problem
+    from nlbench.statistics.layout import Layout
     from nlbench.systems.discrete import DiscreteSystem
     from nlbench.systems.system import System
+
+MOST_MEASUREMENTS = 500  # of a run in `responses`: a continuous measurement has one for each step
 
 
 def replay(
@@ -53,7 +56,20 @@ def replay(
     return pd.DataFrame(columns)
 
 
-def traces(compiled: Compiled, trajectories: Sequence[int], threads: int) -> pd.DataFrame:
+def traced(compiled: Compiled, trajectories: Sequence[int], threads: int) -> dict[str, pd.DataFrame]:
+    """The tables of single trajectories: `traces`, and `responses` where states have names that all filters share."""
+    with ThreadPoolExecutor(threads) as pool:
+        views = list(pool.map(compiled.view, trajectories))
+    problem = compiled.problem
+    models = [problem.truth, *(runner.filter.system for runner in problem.runners)]
+    made = {"traces": traces(problem.layout, trajectories, views)}
+    named = len(problem.layout.coordinates)
+    if all(model.error is None and model.states == named for model in models):
+        made["responses"] = responses(problem, trajectories, views)
+    return made
+
+
+def traces(layout: Layout, trajectories: Sequence[int], views: Sequence[View]) -> pd.DataFrame:
     """`trajectory, filter, time, coordinate, error, deviation, diverged` of all filters at all output times.
 
     error is truth minus estimate, deviation the standard deviation that the filter states for it: NaN where its
@@ -61,9 +77,6 @@ def traces(compiled: Compiled, trajectories: Sequence[int], threads: int) -> pd.
     """
     import pandas as pd
 
-    layout = compiled.problem.layout
-    with ThreadPoolExecutor(threads) as pool:
-        views = list(pool.map(compiled.view, trajectories))
     error, variance = (
         np.array([getattr(view, part) for view in views], float) for part in ("error", "variance")
     )
@@ -77,6 +90,32 @@ def traces(compiled: Compiled, trajectories: Sequence[int], threads: int) -> pd.
     }
     values = {"error": error, "deviation": deviation(variance), "diverged": diverged}
     return pd.DataFrame({**labels, **{column: value.ravel() for column, value in values.items()}})
+
+
+def responses(problem: Problem, trajectories: Sequence[int], views: Sequence[View]) -> pd.DataFrame:
+    """`trajectory, kind, filter, name, time, value`.
+
+    kind `truth` and `estimate`: states by name at all output times, an estimate with its filter. kind `measurement`:
+    `y1` and so on, made at fixed times; every second, third ... where there would be too many.
+    """
+    import pandas as pd
+
+    layout, measured = problem.layout, problem.schedule.measurement_times
+    every = max(1, -(-len(measured) // MOST_MEASUREMENTS))
+    ys = tuple(f"y{r + 1}" for r in range(problem.truth.measurements))
+    parts = []
+    for trajectory, view in zip(trajectories, views, strict=True):
+        series = [("truth", "", layout.coordinates, layout.times, view.truth)]
+        for label, runner, components in zip(layout.filters, problem.runners, view.components, strict=True):
+            estimate = components[:, : runner.filter.system.states]
+            series.append(("estimate", label, layout.coordinates, layout.times, estimate))
+        if measured:
+            series.append(("measurement", "", ys, measured[::every], view.measurements[::every]))
+        for kind, label, names, times, values in series:
+            for name, value in zip(names, np.asarray(values, float).T, strict=True):
+                labels = {"trajectory": trajectory, "kind": kind, "filter": label, "name": name}
+                parts.append(pd.DataFrame({**labels, "time": times, "value": value}))
+    return pd.concat(parts, ignore_index=True)
 
 
 def deviation(variance: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from nlbench.errors import DamagedResults
 from nlbench.results.atomic import atomic_write
 from nlbench.results.checksum import of_json
 
-SCHEMA = 1
+SCHEMA = 2
 _PACKAGES = ("nlbench", "jax", "jaxlib", "numpy", "equinox", "diffrax", "pandas", "pyarrow")
 
 

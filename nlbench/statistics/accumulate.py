@@ -43,7 +43,9 @@ def block_sums(tracks: Tracks, mask: Bool[Array, " L"], layout: Layout) -> dict[
         **_divergence(lost[:, reports], mask, tracks),
         **({} if tracks.scores is None else score_sums(tracks.scores, alive)),
         "report_error": tracks.error[:, reports],
-        "report_diverged": lost[:, reports],
+        "report_variance": tracks.variance[:, reports].astype(jnp.float32),
+        "report_third": tracks.third[:, reports].astype(jnp.float32),
+        "report_lost": lost[:, reports],
     }
 
 

@@ -1,91 +1,84 @@
-"""Verdicts on the orderings that an experiment claims.
+"""Verdicts on what an experiment claims, and how often a test of the source's size would show it.
 
-`less: [a, b, c]` means a < b < c: the neighbours are compared at every time of the claim (by default all
-report times), by the paired difference where there is one, otherwise as if independent (which is cautious,
-since the runs are shared). All comparisons of the experiment share Holm's (1979) correction at level 5 %. A
-claim is confirmed when all its comparisons are significant in the claimed direction, refuted when one is
-significant in the other, and undecided otherwise; fewer than 30 runs decide nothing. The estimate shown is the
-difference of the comparison that supports the claim least, with its own 95 % interval.
+A claim is taken apart into comparisons (`statistics.comparisons`). All comparisons of the experiment share
+Holm's (1979) correction at level 5 %, two-sided. A claim is confirmed when all its comparisons are significant in
+the claimed direction, refuted when one is significant in the other, and undecided otherwise; fewer than 30 runs
+decide nothing. Numbers that a source prints (`statistics.printed`) are refuted when one differs significantly and
+confirmed when none does. The estimate shown is the margin of the comparison that supports the claim least, with its
+own 95 % interval; it is negative where the claim holds, or printed minus measured.
 """
 
+from __future__ import annotations
+
 import math
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple, Protocol, runtime_checkable
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 import pandas as pd
 
+from nlbench.statistics.comparisons import Claim, Comparison, Tables, terms
+from nlbench.statistics.printed import against_moments
+from nlbench.statistics.sets import KeptTable, sets_table
 from nlbench.statistics.uncertainty import NORMAL_975, p_value
 
 LEVEL = 0.05
 LEAST_RUNS = 30  # fewer do not make a mean normal enough for a verdict
-COLUMNS = ("id", "says", "verdict", "estimate", "low", "high", "n")
+COLUMNS = ("id", "says", "verdict", "estimate", "low", "high", "n", "where", "whose", "figures")
 
 
-@runtime_checkable
-class Claim(Protocol):
-    """What is needed of a claim of the experiment file."""
+class _Tested(NamedTuple):
+    """A comparison and its two-sided p-value, 1 where nothing can be said."""
 
-    @property
-    def id(self) -> str: ...
-
-    @property
-    def says(self) -> str: ...
-
-    @property
-    def statistic(self) -> str: ...
-
-    @property
-    def less(self) -> Sequence[str]: ...
-
-    @property
-    def at(self) -> Sequence[float]: ...
-
-    @property
-    def coordinate(self) -> str | None: ...
-
-
-class Comparison(NamedTuple):
-    """Statistic of the smaller minus that of the larger, as claimed."""
-
-    difference: float
-    stderr: float
-    n: int
-
-    @property
-    def p(self) -> float:
-        """1 where nothing can be said."""
-        p = p_value(self.difference, self.stderr)
-        return 1.0 if math.isnan(p) or self.n < LEAST_RUNS else p
+    comparison: Comparison
+    p: float
 
     @property
     def against(self) -> float:
         """How far it speaks against the claim, in standard errors."""
-        if math.isnan(self.difference) or math.isnan(self.stderr):
+        margin, stderr, _ = self.comparison
+        if math.isnan(margin) or math.isnan(stderr):
             return math.inf
-        return self.difference / self.stderr if self.stderr else math.copysign(math.inf, self.difference)
+        return margin / stderr if stderr else math.copysign(math.inf, margin)
 
 
-def evaluate(claims: Iterable[Claim], statistics: pd.DataFrame, paired: pd.DataFrame) -> pd.DataFrame:
-    """`id, says, verdict, estimate, low, high, n` of each claim, from the other two tables."""
+def judged(
+    claims: Iterable[Claim], tables: Mapping[str, pd.DataFrame], kept: KeptTable, source_runs: int | None
+) -> dict[str, pd.DataFrame]:
+    """The tables `claims` and `sets`, from the tables statistics, paired and moments and the kept runs."""
     claims = list(claims)
-    lookup = _Tables(statistics, paired)
-    compared = [
-        [
-            lookup.compare(claim.statistic, claim.coordinate, time, a, b)
-            for time in claim.at or lookup.times
-            for a, b in zip(claim.less, claim.less[1:], strict=False)
-        ]
+    return {
+        "claims": evaluate(claims, tables, kept, source_runs),
+        "sets": sets_table([claim for claim in claims if claim.form != "printed"], kept, source_runs),
+    }
+
+
+def evaluate(
+    claims: Iterable[Claim],
+    tables: Mapping[str, pd.DataFrame],
+    kept: KeptTable | None = None,
+    source_runs: int | None = None,
+) -> pd.DataFrame:
+    """`id, says, verdict, estimate, low, high, n` of each claim, then where, whose and figures as in the file."""
+    claims = list(claims)
+    lookup = Tables(tables["statistics"], tables["paired"])
+    tested = [
+        [_Tested(*each) for each in against_moments(claim, tables["moments"], kept, source_runs)]
+        if claim.form == "printed" and kept is not None
+        else [_tested(lookup.compare(term)) for term in terms(claim, lookup.first_coordinate, lookup.times)]
         for claim in claims
     ]
-    significant = iter(holm([comparison.p for comparisons in compared for comparison in comparisons]))
+    significant = iter(holm([each.p for comparisons in tested for each in comparisons]))
     rows = []
-    for claim, comparisons in zip(claims, compared, strict=True):
-        signs = [math.copysign(1, c.difference) if next(significant) else 0 for c in comparisons]
-        verdict = "refuted" if 1 in signs else "confirmed" if signs and set(signs) == {-1} else "undecided"
-        weakest = max(comparisons, key=lambda c: c.against, default=Comparison(math.nan, math.nan, 0))
-        margin = NORMAL_975 * weakest.stderr
-        interval = weakest.difference - margin, weakest.difference + margin
-        rows.append((claim.id, claim.says, verdict, weakest.difference, *interval, weakest.n))
+    for claim, comparisons in zip(claims, tested, strict=True):
+        signs = [
+            math.copysign(1, each.comparison.margin) if next(significant) else 0.0 for each in comparisons
+        ]
+        verdict = _agreement(comparisons, signs) if claim.form == "printed" else _verdict(signs)
+        worst = max(comparisons, key=lambda each: _weakness(claim, each), default=_UNKNOWN).comparison
+        reach = NORMAL_975 * worst.stderr
+        estimate = worst.margin, worst.margin - reach, worst.margin + reach, worst.n
+        figures = " ".join(claim.figures or ())
+        rows.append((claim.id, claim.says, verdict, *estimate, claim.where or "", claim.whose, figures))
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
@@ -99,32 +92,27 @@ def holm(p_values: list[float], level: float = LEVEL) -> list[bool]:
     return rejected
 
 
-class _Tables:
-    """Differences between two filters, looked up in the tables."""
-
-    def __init__(self, statistics: pd.DataFrame, paired: pd.DataFrame):
-        self.first_coordinate = statistics["coordinate"].iloc[0]
-        self.times = list(dict.fromkeys(paired["time"]))
-        self.statistics = {
-            (row.filter, _time(row.time), row.coordinate, row.statistic): row
-            for row in statistics.itertuples()
-        }
-        self.paired = {
-            (row.filter_a, row.filter_b, _time(row.time), row.coordinate, row.statistic): row
-            for row in paired.itertuples()
-        }
-
-    def compare(self, statistic: str, coordinate: str | None, time: float, a: str, b: str) -> Comparison:
-        what = (_time(time), coordinate or self.first_coordinate, statistic)
-        for sign, key in ((1, (a, b, *what)), (-1, (b, a, *what))):
-            if row := self.paired.get(key):
-                return Comparison(sign * row.difference, row.stderr, row.n)
-        first, second = (self.statistics.get((label, *what)) for label in (a, b))
-        if first is None or second is None:
-            return Comparison(math.nan, math.nan, 0)
-        difference = first.value - second.value
-        return Comparison(difference, math.hypot(first.stderr, second.stderr), min(first.n, second.n))
+_UNKNOWN = _Tested(Comparison(math.nan, math.nan, 0), 1.0)
 
 
-def _time(time: float | str) -> float | str:
-    return "all" if time == "all" else round(float(time), 9)
+def _tested(comparison: Comparison) -> _Tested:
+    p = p_value(comparison.margin, comparison.stderr)
+    return _Tested(comparison, 1.0 if math.isnan(p) or comparison.n < LEAST_RUNS else p)
+
+
+def _verdict(signs: list[float]) -> str:
+    if 1 in signs:
+        return "refuted"
+    return "confirmed" if signs and set(signs) == {-1} else "undecided"
+
+
+def _agreement(comparisons: list[_Tested], signs: list[float]) -> str:
+    """Of printed numbers; undecided where one has nothing to be compared with."""
+    if any(signs):
+        return "refuted"
+    known = comparisons and not any(math.isnan(each.comparison.stderr) for each in comparisons)
+    return "confirmed" if known else "undecided"
+
+
+def _weakness(claim: Claim, tested: _Tested) -> float:
+    return -tested.p if claim.form == "printed" else tested.against

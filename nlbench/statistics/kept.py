@@ -1,42 +1,62 @@
-"""Errors of the first runs at the report times, kept one by one for medians, own plots and resampling."""
+"""What filters did at the report times in the first runs, kept one by one for medians, densities and resampling."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from nlbench.statistics.layout import Layout
 
 
+class Reported(NamedTuple):
+    """Of runs at the report times: errors (F, R, C, runs), the variances and third moments that the filters state for
+    them (the same, in single precision), and whether the filter lost the run (F, R, runs)."""
+
+    error: np.ndarray
+    variance: np.ndarray
+    third: np.ndarray
+    lost: np.ndarray
+
+
 class KeptRuns:
-    """The first `capacity` runs: errors (F, R, C, kept) and whether the filter lost the run (F, R, kept)."""
+    """The first `capacity` runs."""
 
     def __init__(self, layout: Layout, capacity: int):
-        filters, reports = len(layout.filters), len(layout.reports)
-        self._error = np.empty((filters, reports, len(layout.coordinates), capacity))
-        self._lost = np.empty((filters, reports, capacity), bool)
+        shape = (len(layout.filters), len(layout.reports), len(layout.coordinates), capacity)
+        self._room = Reported(
+            np.empty(shape),
+            np.empty(shape, np.float32),
+            np.empty(shape, np.float32),
+            np.empty((*shape[:2], capacity), bool),
+        )
         self.count = 0
 
-    def add(self, error: np.ndarray, lost: np.ndarray) -> None:
+    def add(self, runs: Reported) -> None:
         """Keep as many of these runs as there is room for."""
-        fit = min(error.shape[-1], self._error.shape[-1] - self.count)
-        self._error[..., self.count : self.count + fit] = error[..., :fit]
-        self._lost[..., self.count : self.count + fit] = lost[..., :fit]
+        fit = min(runs.lost.shape[-1], self._room.lost.shape[-1] - self.count)
+        for room, given in zip(self._room, runs, strict=True):
+            room[..., self.count : self.count + fit] = given[..., :fit]
         self.count += fit
 
     @property
+    def runs(self) -> Reported:
+        """All that is kept."""
+        return Reported(*(part[..., : self.count] for part in self._room))
+
+    @property
     def error(self) -> np.ndarray:
-        return self._error[..., : self.count]
+        return self.runs.error
 
     @property
     def lost(self) -> np.ndarray:
-        return self._lost[..., : self.count]
+        return self.runs.lost
 
     def state(self) -> dict[str, np.ndarray]:
-        return {"kept_error": self.error.copy(), "kept_lost": self.lost.copy()}
+        return {f"kept_{name}": part.copy() for name, part in self.runs._asdict().items()}
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         self.count = 0
-        self.add(state["kept_error"], state["kept_lost"])
+        self.add(Reported(*(state[f"kept_{name}"] for name in Reported._fields)))
 
 
 def magnitudes(error: np.ndarray, layout: Layout) -> np.ndarray:

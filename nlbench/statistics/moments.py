@@ -5,13 +5,14 @@ import pandas as pd
 
 from nlbench.statistics.layout import Layout
 from nlbench.statistics.totals import Totals
-from nlbench.statistics.uncertainty import JACKKNIFE_GROUPS, Sums, jackknife
+from nlbench.statistics.uncertainty import JACKKNIFE_GROUPS, Sums, enough_groups, jackknife
 
 
 def moments_table(totals: Totals) -> pd.DataFrame:
-    """`filter, time, indices, estimated, actual, stderr, n, names`.
+    """`filter, time, indices, estimated, actual, stderr, n, names, estimated_stderr`.
 
-    indices: of the coordinates, from 1 (`1,2`); names: what these are called. stderr is that of `actual`.
+    indices: of the coordinates, from 1 (`1,2`); names: what these are called. stderr is that of `actual`;
+    estimated_stderr is known from 32 filled groups on.
     """
     layout, groups = totals.layout, totals.groups
     pairs, triples = layout.components(2), layout.components(3)
@@ -33,10 +34,12 @@ def moments_table(totals: Totals) -> pd.DataFrame:
     with np.errstate(invalid="ignore", divide="ignore"):
         total = {name: value.sum(0) for name, value in sums.items()}
         actual = actual_of(total)
-        estimated = np.concatenate(
-            [groups["estimated_second"].sum(0), groups["estimated_third"].sum(0)], axis=-1
+        stated = np.concatenate([groups["estimated_second"], groups["estimated_third"]], axis=-1)
+        weight = np.broadcast_to(alive, stated.shape)
+        estimated = _mean({"stated": stated.sum(0), "n": total["n"]})
+        estimated_stderr = np.where(
+            enough_groups(weight), jackknife(_mean, {"stated": stated, "n": alive}, weight), np.nan
         )
-        estimated = estimated / total["n"]
     if totals.filled_groups >= JACKKNIFE_GROUPS or not totals.all_kept:
         stderr = unit * jackknife(actual_of, sums, np.broadcast_to(alive, (*alive.shape[:-1], len(unit))))
     else:
@@ -55,8 +58,14 @@ def moments_table(totals: Totals) -> pd.DataFrame:
             "stderr": stderr.ravel(),
             "n": np.broadcast_to(total["n"], shape).astype(np.int64).ravel(),
             "names": np.array(named, object)[indices],
+            "estimated_stderr": estimated_stderr.ravel(),
         }
     )
+
+
+def _mean(part: Sums) -> np.ndarray:
+    """Of what the filters state."""
+    return part["stated"] / part["n"]
 
 
 def _central(first: np.ndarray, second: np.ndarray, third: np.ndarray, layout: Layout) -> np.ndarray:

@@ -7,6 +7,7 @@ import pandas as pd
 
 from nlbench.statistics.averages import averages
 from nlbench.statistics.error_moments import error_moments
+from nlbench.statistics.kept import Reported
 from nlbench.statistics.layout import Layout
 from nlbench.statistics.medians import medians
 from nlbench.statistics.moments import moments_table
@@ -110,13 +111,15 @@ def _median_time(layout: Layout, counts: np.ndarray) -> float:
 
 
 def runs_table(totals: Totals) -> pd.DataFrame:
-    """The errors of the first `keep_runs` runs: `filter, time, run`, a column per coordinate, `diverged`."""
+    """The first `keep_runs` runs: `filter, time, run`, per coordinate the error and the `_variance` and `_third` moment
+    that the filter states for it (single precision), and `diverged`."""
     layout = totals.layout
-    count = min(totals.kept.count, layout.keep_runs)
-    error, lost = totals.kept.error[..., :count], totals.kept.lost[..., :count]
-    f, r, run = np.indices(lost.shape).reshape(3, -1)
+    kept = Reported(*(part[..., : layout.keep_runs] for part in totals.kept.runs))
+    f, r, run = np.indices(kept.lost.shape).reshape(3, -1)
     columns: Iterable[tuple[str, np.ndarray]] = (
-        (name, error[:, :, c].ravel()) for c, name in enumerate(layout.coordinates)
+        (f"{name}{suffix}", part[:, :, c].ravel())
+        for suffix, part in (("", kept.error), ("_variance", kept.variance), ("_third", kept.third))
+        for c, name in enumerate(layout.coordinates)
     )
     return pd.DataFrame(
         {
@@ -124,6 +127,6 @@ def runs_table(totals: Totals) -> pd.DataFrame:
             "time": np.array(layout.report_times)[r],
             "run": run,
             **dict(columns),
-            "diverged": lost.ravel(),
+            "diverged": kept.lost.ravel(),
         }
     )

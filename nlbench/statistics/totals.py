@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from nlbench.statistics import histogram
-from nlbench.statistics.kept import KeptRuns, magnitudes
+from nlbench.statistics.kept import KeptRuns, Reported, magnitudes
 from nlbench.statistics.layout import GROUPS, Layout
 from nlbench.statistics.powers import shifted
 from nlbench.statistics.uncertainty import JACKKNIFE_GROUPS
@@ -62,8 +62,8 @@ class Totals:
             self._add({name: np.asarray(value)[start : start + GROUPS] for name, value in sums.items()})
 
     def _add(self, host: dict[str, np.ndarray]) -> None:
-        error, lost = host.pop("report_error"), host.pop("report_diverged")
-        real, lanes = host["total"], lost.shape[-1]
+        given = Reported(*(host.pop(f"report_{name}") for name in Reported._fields))
+        real, lanes = host["total"], given.lost.shape[-1]
         if self._padded or (real[:-1] < lanes).any():
             raise ValueError(
                 "a block after a padded one: add a padded block last, and to a copy of the totals only"
@@ -75,7 +75,7 @@ class Totals:
         for name, value in moved.items():
             self.groups[name][group] += value
         runs = int(real.sum())
-        self._add_runs(*(_in_a_row(array)[..., :runs] for array in (error.astype(np.float64), lost)))
+        self._add_runs(Reported(*(_in_a_row(part)[..., :runs] for part in given)))
         self.blocks += len(real)
         self.runs += runs
         self._padded = bool(real[-1] < lanes)
@@ -118,12 +118,13 @@ class Totals:
             "cross_third": third + alive * factors.prod(-2),
         }
 
-    def _add_runs(self, error: np.ndarray, lost: np.ndarray) -> None:
-        size = np.where(lost[:, :, None], np.inf, magnitudes(error, self.layout) / self._scale)
+    def _add_runs(self, runs: Reported) -> None:
+        size = magnitudes(runs.error.astype(np.float64), self.layout) / self._scale
+        size = np.where(runs.lost[:, :, None], np.inf, size)
         bins = histogram.bin_of(size) + self._bin_offset
         flat = self.histogram.reshape(-1)
         flat += np.bincount(bins.ravel(), minlength=flat.size)
-        self.kept.add(error, lost)
+        self.kept.add(runs)
 
     @property
     def all_kept(self) -> bool:

@@ -16,14 +16,16 @@ def test_every_table_has_the_columns_of_the_contract(sample):
     tables = summary.tables(sample[2])
     columns = {name: list(table.columns) for name, table in tables.items()}
     assert columns.keys() == {"statistics", "moments", "paired", "divergence", "runs"}
-    assert columns["moments"] == ["filter", "time", "indices", "estimated", "actual", "stderr", "n", "names"]
+    moments = ["filter", "time", "indices", "estimated", "actual", "stderr", "n"]
+    assert columns["moments"] == [*moments, "names", "estimated_stderr"]
     assert columns["paired"] == [
         *("filter_a", "filter_b", "time", "coordinate", "statistic", "difference", "stderr", "n", "p_value"),
     ]
     assert columns["divergence"][:8] == [
         *("filter", "n", "diverged", "fraction", "low", "high", "first_time_median", "guarded"),
     ]
-    assert columns["runs"] == ["filter", "time", "run", "position", "velocity", "diverged"]
+    stated = [f"{name}_{moment}" for moment in ("variance", "third") for name in ("position", "velocity")]
+    assert columns["runs"] == ["filter", "time", "run", "position", "velocity", *stated, "diverged"]
 
 
 def test_cross_moments_equal_numpy(sample):
@@ -45,6 +47,26 @@ def test_cross_moments_equal_numpy(sample):
             np.prod(x[list(component)], axis=0).mean(), rel=1e-10, abs=1e-13
         )
         assert row["estimated"] == pytest.approx(estimated, rel=1e-12)
+
+
+def test_kept_runs_hold_what_each_filter_stated_of_its_error(sample):
+    _, runs, totals = sample
+    rows = summary.runs_table(totals)
+    rows = rows[(rows["filter"] == "filter 2") & (rows["time"] == 1.5)]
+    for name, given in (("", runs.error), ("_variance", runs.variance), ("_third", runs.third)):
+        stated = given[1, 3, 1, : len(rows)]
+        np.testing.assert_allclose(rows[f"velocity{name}"], stated, rtol=1e-6 if name else 0)
+
+
+def test_the_standard_error_of_an_estimated_moment_is_that_of_a_mean_over_the_runs_that_are_left():
+    layout = made_runs.layout(filters=2)
+    runs = made_runs.make(layout, 20_000, seed=15)
+    good = ~made_runs.lost(runs, layout)[0, 3]
+    stated = runs.cov[0, 1, 1][good]
+    rows = moments_table(made_runs.total(runs, layout)).set_index(["filter", "time", "indices"])
+    row = rows.loc[("filter 1", 1.5, "1,2")]
+    # The jackknife over 64 groups knows a standard error to 9 %.
+    assert row["estimated_stderr"] == pytest.approx(stated.std() / np.sqrt(len(stated)), rel=0.3)
 
 
 def test_diagonal_moments_are_those_of_the_statistics(sample):
