@@ -161,13 +161,80 @@ def consistency(factors: Mapping[str, float], runs: int) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=columns).astype({"consistent": "boolean"})
 
 
+def kept(factors: Mapping[str, float], coordinates: Mapping[str, str], runs: int) -> pd.DataFrame:
+    """Kept runs whose errors are gamma-distributed about zero, with the variance and the third moment that they have;
+    the variance stated is smaller the worse the filter."""
+    generator, made = np.random.default_rng(5), []
+    for label, factor in factors.items():
+        for time in REPORT_TIMES:
+            scale = 0.1 * np.exp(-0.8 * time)
+            columns = {"filter": label, "time": time, "run": np.arange(runs)}
+            for coordinate in coordinates:
+                columns[coordinate] = scale * factor * (generator.gamma(4.0, size=runs) - 4.0)
+            for coordinate in coordinates:
+                columns[f"{coordinate}_variance"] = np.full(runs, 4 * scale**2 / factor, np.float32)
+                columns[f"{coordinate}_third"] = np.full(runs, 8 * scale**3, np.float32)
+            made.append(pd.DataFrame({**columns, "diverged": False}))
+    return pd.concat(made, ignore_index=True)
+
+
 def claims() -> pd.DataFrame:
-    """One claim of each verdict."""
+    """One claim of each verdict; the last is ours."""
     rows = [
-        (f"C{index}", f"claim number {index}", verdict, -0.01, -0.02, 0.005, 20_000)
-        for index, verdict in enumerate(("confirmed", "refuted", "undecided"))
+        (
+            f"C{index}",
+            f"claim number {index}",
+            verdict,
+            -0.01,
+            -0.02,
+            0.005,
+            20_000,
+            where,
+            whose,
+            "7.18 7.19",
+        )
+        for index, (verdict, where, whose) in enumerate(
+            [
+                ("confirmed", "section 7.3, page 7-9", "source"),
+                ("refuted", "", "source"),
+                ("undecided", "", "ours"),
+            ]
+        )
     ]
-    return pd.DataFrame(rows, columns=["id", "says", "verdict", "estimate", "low", "high", "n"])
+    columns = ["id", "says", "verdict", "estimate", "low", "high", "n", "where", "whose", "figures"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def sets() -> pd.DataFrame:
+    """How often sets of 10 and of 80 runs show the first two claims; of the second, only sets of 80 are known."""
+    rows = [
+        ("C0", 10, 2_000, 0.63, 0.61, 0.65),
+        ("C0", 80, 250, 0.93, 0.89, 0.96),
+        ("C1", 80, 250, 0.0, 0.0, 0.015),
+    ]
+    return pd.DataFrame(rows, columns=["id", "runs", "sets", "share", "low", "high"])
+
+
+def responses(factors: Mapping[str, float], coordinates: Mapping[str, str], runs: tuple) -> pd.DataFrame:
+    """Truth cos t, an estimate that is off by a tenth of the factor, and a measurement at every second time."""
+    times, made = np.array(TIMES), []
+    for run in runs:
+        curves = [("truth", "", name, times, np.cos(times)) for name in coordinates]
+        curves += [
+            ("estimate", label, name, times, np.cos(times) + 0.1 * factor)
+            for label, factor in factors.items()
+            for name in coordinates
+        ]
+        curves.append(("measurement", "", "y1", times[::2], 30 * np.sin(9 * times[::2])))
+        for kind, label, name, at, value in curves:
+            labels = {"trajectory": run, "kind": kind, "filter": label, "name": name}
+            made.append(pd.DataFrame({**labels, "time": at, "value": value}))
+    return pd.concat(made, ignore_index=True)
+
+
+def costs(factors: Mapping[str, float]) -> pd.DataFrame:
+    """Costs of all filters: each ten times that of the one before."""
+    return pd.DataFrame({"filter": list(factors), "ns_per_step": [10.0**i for i in range(len(factors))]})
 
 
 def cost() -> pd.DataFrame:

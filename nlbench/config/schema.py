@@ -47,7 +47,8 @@ class Head(Section):
         description="where claims, medians and kept runs are taken; default: the end",
     )
     figures: list[Figure] | None = Field(
-        default=None, description="kinds of figures to draw; default: all that apply"
+        default=None,
+        description="kinds of figures to draw; default: all that apply but density, response and final",
     )
     traces: list[RunNumber] = Field(
         default_factory=list,

@@ -9,11 +9,15 @@ from typing import TYPE_CHECKING
 from nlbench.errors import ConfigError
 from nlbench.figures import style
 from nlbench.figures.consistency import nees
+from nlbench.figures.cost import cost
 from nlbench.figures.data import Data, read
+from nlbench.figures.density import density
 from nlbench.figures.divergence import divergence
 from nlbench.figures.error_curves import mean_error, rms, rms_clipped
+from nlbench.figures.final import final
 from nlbench.figures.moment_curves import third_moment, variance
 from nlbench.figures.picture import Picture, png, settle, svg
+from nlbench.figures.responses import response
 from nlbench.figures.traces import trace
 from nlbench.results.atomic import atomic_write, remove
 
@@ -29,16 +33,24 @@ FIGURES: dict[str, Callable[[Data], Iterator[Picture]]] = {
     "nees": nees,
     "divergence": divergence,
     "trace": trace,
+    "density": density,
+    "response": response,
+    "cost": cost,
+    "final": final,
 }
+# Drawn only where an experiment file asks for them: there are many pictures of these, or they show what others do.
+ON_REQUEST = ("density", "response", "final")
 
 
 def draw(results: Results, names: Sequence[str] | None = None) -> list[Path]:
     """Draw the figures of a run into its folder `figures/`, as SVG and PNG. Returns the paths written.
 
-    `names` are keys of `FIGURES`; by default those that the experiment asks for, or all that its tables allow.
-    Pictures of the same kinds that the run no longer has are removed. Raises `ConfigError` for an unknown name.
+    `names` are keys of `FIGURES`; by default those that the experiment asks for, or all but those `ON_REQUEST`, as far
+    as its tables allow. Pictures that the run no longer has are removed: of the kinds named, by default of all kinds.
+    Raises `ConfigError` for an unknown name.
     """
-    names = names or results.experiment.figures or tuple(FIGURES)
+    kinds = names or FIGURES
+    names = names or results.experiment.figures or [name for name in FIGURES if name not in ON_REQUEST]
     unknown = [name for name in names if name not in FIGURES]
     if unknown:
         raise ConfigError(f"unknown figure {', '.join(map(repr, unknown))}; known: {', '.join(FIGURES)}")
@@ -53,6 +65,6 @@ def draw(results: Results, names: Sequence[str] | None = None) -> list[Path]:
                     atomic_write(path, content)
                     written.append(path)
     for path in sorted(folder.glob("*")):
-        if path.stem.split("-")[0] in names and path not in written:
+        if path.stem.split("-")[0] in kinds and path not in written:
             remove(path)
     return written

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -21,7 +23,8 @@ class Curve(NamedTuple):
 
 
 class Data(NamedTuple):
-    """Curves and tables of a run. `baseline` is the filter that others are drawn relative to."""
+    """Curves and tables of a run. `baseline` is the filter that others are drawn relative to; `norms` are the names of
+    those among the coordinates; `saved` reads a table that only some figures need, None where the run has none."""
 
     filters: tuple[str, ...]
     baseline: str
@@ -33,6 +36,8 @@ class Data(NamedTuple):
     paired: pd.DataFrame
     divergence: pd.DataFrame
     traces: pd.DataFrame
+    norms: tuple[str, ...]
+    saved: Callable[[str], pd.DataFrame | None]
     consistency: pd.DataFrame | None = None
     bounds: pd.DataFrame | None = None
 
@@ -86,9 +91,15 @@ def read(results: Results) -> Data:
         traces=results.table("traces")
         if "traces" in results.tables
         else pd.DataFrame(columns=["trajectory"]),
-        consistency=results.table("consistency") if "consistency" in results.tables else None,
-        bounds=results.table("bounds") if "bounds" in results.tables else None,
+        norms=tuple(results.manifest.get("norms", {})),
+        saved=partial(_saved, results),
+        consistency=_saved(results, "consistency"),
+        bounds=_saved(results, "bounds"),
     )
+
+
+def _saved(results: Results, name: str) -> pd.DataFrame | None:
+    return results.table(name) if name in results.tables else None
 
 
 def units(results: Results) -> dict[str, str]:

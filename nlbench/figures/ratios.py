@@ -26,7 +26,7 @@ def draw(axes: Axes, data: Data, statistic: str, coordinate: str) -> None:
     for index, label in enumerate(data.filters):
         curve = data.curve(label, coordinate, statistic)
         axes.plot(curve.time, curve.value / unit, **style.line(looks[label], index, len(curve.time)))
-        time, ratio, reach = _intervals(data, label, curve, unit, statistic, coordinate)
+        time, ratio, reach = intervals(data, label, statistic, coordinate)
         beside = (index - (len(data.filters) - 1) / 2) * step
         axes.errorbar(
             time + beside, ratio, reach, fmt="none", ecolor=looks[label].colour, elinewidth=0.9, capsize=2
@@ -45,8 +45,8 @@ def draw(axes: Axes, data: Data, statistic: str, coordinate: str) -> None:
     style.literal(axes.set_ylabel(f"relative to\n{style.short(data.baseline, 20)}"))
 
 
-def _intervals(
-    data: Data, label: str, curve: Curve, unit: np.ndarray, statistic: str, coordinate: str
+def intervals(
+    data: Data, label: str, statistic: str, coordinate: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times of the paired comparisons with the baseline; there, the ratio and half the width of its 95 % interval."""
     rows = data.paired
@@ -55,6 +55,17 @@ def _intervals(
         *((rows["filter_a"] == p["filter_a"]) & (rows["filter_b"] == p["filter_b"]) for p in pairs)
     )
     rows = rows[either & (rows["coordinate"] == coordinate) & (rows["statistic"] == statistic)]
-    time = rows["time"].to_numpy(float)
-    at = np.searchsorted(curve.time, time - 1e-9)
-    return time, (curve.value / unit)[at], bands.Z95 * rows["stderr"].to_numpy(float) / unit[at]
+    time, difference = rows["time"].to_numpy(float), rows["stderr"].to_numpy(float)
+    curves = [data.curve(name, coordinate, statistic) for name in (label, data.baseline)]
+    a, b = ([part[np.searchsorted(curve.time, time - 1e-9)] for part in curve[1:3]] for curve in curves)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = a[0] / np.where(b[0] > 0, b[0], np.nan)
+        return time, ratio, bands.Z95 * of_ratio(ratio, a[1], b[1], difference) / b[0]
+
+
+def of_ratio(ratio: np.ndarray, a: np.ndarray, b: np.ndarray, difference: np.ndarray) -> np.ndarray:
+    """The standard error of r = A/B in units of B, from those of A, B and A - B, by the delta method.
+
+    var(A - r B) = (1 - r) var A + r (r - 1) var B + r var(A - B); of runs in common, A and B depend on each other.
+    """
+    return np.sqrt(np.maximum((1 - ratio) * a**2 + ratio * (ratio - 1) * b**2 + ratio * difference**2, 0.0))

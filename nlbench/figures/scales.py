@@ -34,11 +34,13 @@ def signed(axes: Axes, values: np.ndarray, band: np.ndarray) -> None:
         axes.set_ylim(*bands.limits(values, band))
 
 
-def logarithmic(axes: Axes) -> None:
-    """A logarithmic scale whose ticks are written as plain numbers (which matplotlib also draws ten times faster)."""
+def logarithmic(axes: Axes, direction: str = "y", ticks: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
+    """A logarithmic scale whose ticks, at these multiples of powers of ten, are written as plain numbers (which
+    matplotlib also draws ten times faster)."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    axes.set_yscale("log", nonpositive="clip")
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set(**{f"{direction}scale": "log"})
+    axis = axes.xaxis if direction == "x" else axes.yaxis
+    axis.set_major_locator(LogLocator(subs=ticks, numticks=8))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

@@ -73,7 +73,7 @@ def test_other_tables_do_not_change_by_a_byte(done, tmp_path):
 
 def test_threads_do_not_change_a_byte_of_the_traces(done, tmp_path):
     other = nb.run(traced(engine={"threads": 1, "chunk": 1}), tmp_path)
-    for name in ("traces.csv", "traces.parquet"):
+    for name in ("traces.csv", "traces.parquet", "responses.parquet"):
         assert (other.path / "tables" / name).read_bytes() == (done.path / "tables" / name).read_bytes()
 
 
@@ -88,9 +88,10 @@ def test_a_finished_run_gains_and_loses_traces_without_being_computed_again(done
     assert not after.damaged()
     assert table_bytes(after.path) == table_bytes(done.path)
     assert after.table("traces").equals(done.table("traces"))
+    assert after.table("responses").equals(done.table("responses"))
     again = nb.run(plain, tmp_path)
     assert "traces" not in again.tables
-    assert not list((again.path / "tables").glob("traces*"))
+    assert not [*(again.path / "tables").glob("traces*"), *(again.path / "tables").glob("responses*")]
 
 
 def test_a_negative_variance_has_no_deviation():
@@ -117,7 +118,11 @@ def test_errors_are_the_systems_own_and_deviations_go_through_its_jacobian(tmp_p
         "monte_carlo": {"runs": 70, "seed": 3},
         "traces": [69],
     }
-    table = nb.run(stated, tmp_path).table("traces")
+    results = nb.run(stated, tmp_path)
+    assert (
+        "responses" not in results.tables
+    )  # of states that have no names, and may be others in another filter
+    table = results.table("traces")
     shown = engine.replay(stated, "ekf", 69)
     np.testing.assert_allclose(
         shown["energy_error"], shown["x1_truth"] ** 2 - shown["x1_mean"] ** 2, rtol=1e-12
@@ -145,3 +150,48 @@ def test_replay_names_states_after_the_errors_where_these_are_differences():
     expected += [f"{name}_truth" for name in names]
     expected += [f"{name}_{part}" for name in names for part in ("mean", "variance", "third")]
     assert list(columns) == ["time", *expected, "y1", "y2", "diverged"]
+
+
+def series(done, run, kind, label="", name="x"):
+    """Times and values of one curve of the responses."""
+    table = done.table("responses")
+    keys = {"trajectory": run, "kind": kind, "filter": label, "name": name}
+    rows = table[np.logical_and.reduce([table[column] == key for column, key in keys.items()])]
+    return rows["time"].to_numpy(), rows["value"].to_numpy()
+
+
+def test_responses_are_truth_and_estimates_whose_difference_is_the_error(done):
+    table = done.table("traces")
+    assert list(done.table("responses").columns) == ["trajectory", "kind", "filter", "name", "time", "value"]
+    for run in TRACED:
+        times, truth = series(done, run, "truth")
+        for label in ("third-order", "third-order-guarded", "exact"):
+            rows = table[(table["trajectory"] == run) & (table["filter"] == label)]
+            np.testing.assert_array_equal(times, rows["time"])
+            np.testing.assert_array_equal(truth - series(done, run, "estimate", label)[1], rows["error"])
+
+
+def test_responses_have_every_measurement_made_at_fixed_times(done):
+    times, values = series(done, 77, "measurement", name="y1")
+    interval = nb.systems.build("culver-scalar").interval
+    np.testing.assert_allclose(times, interval * np.arange(1, len(times) + 1))
+    assert times[-1] == pytest.approx(0.6)
+    shown = engine.replay(done.experiment, "exact", 77).set_index("time")["y1"].dropna()
+    np.testing.assert_array_equal(values[np.isin(np.round(times, 9), shown.index)], shown)
+
+
+def test_responses_without_measurements_are_truth_and_estimates(tmp_path):
+    system = {"name": "culver-scalar", "measurement": "none"}
+    table = nb.run(traced().model_copy(update={"system": experiment(system=system).system}), tmp_path)
+    assert set(table.table("responses")["kind"]) == {"truth", "estimate"}
+
+
+def test_of_a_continuous_measurement_a_part_is_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr(trace, "MOST_MEASUREMENTS", 12)
+    stated = experiment(
+        system={"name": "culver-scalar", "measurement": "continuous"},
+        filters=["kushner-2"], reference=None, report_times=[0.6], traces=[3], monte_carlo={"runs": 64, "seed": 1},
+    )  # fmt: skip
+    times, values = series(nb.run(stated, tmp_path), 3, "measurement", name="y1")
+    np.testing.assert_allclose(times, 0.06 * np.arange(10))  # of 30 steps of .02, every third
+    assert np.isfinite(values).all()

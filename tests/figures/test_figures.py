@@ -30,7 +30,14 @@ def test_every_figure_is_drawn_for_every_coordinate(drawn):
         "divergence"
     }
     assert {path.name for path in drawn} == {f"{name}.{kind}" for name in expected for kind in ("svg", "png")}
-    assert set(figures.FIGURES) == {*PER_COORDINATE, "nees", "divergence", "trace"}
+    assert set(figures.FIGURES) == {
+        *PER_COORDINATE,
+        "nees",
+        "divergence",
+        "trace",
+        "cost",
+        *figures.ON_REQUEST,
+    }
     assert all(path.exists() for path in drawn)
 
 
@@ -80,6 +87,21 @@ def test_pictures_that_a_run_no_longer_has_are_removed(tmp_path):
     figures.draw(run)
     assert not stale.exists()
     assert kept.exists()
+
+
+def test_so_are_pictures_that_the_experiment_no_longer_asks_for(tmp_path):
+    figures.draw(synthetic_run.results(tmp_path, figures=["mean_error", "final"]))
+    left = figures.draw(synthetic_run.results(tmp_path, figures=["mean_error"]))
+    assert sorted((tmp_path / "figures").glob("*")) == sorted(left)
+    figures.draw(synthetic_run.results(tmp_path, figures=["mean_error"]), ["final"])
+    assert {path.stem for path in (tmp_path / "figures").glob("*")} == {"mean_error-x", "final-x"}
+
+
+def test_what_is_drawn_on_request_is_not_drawn_without_one(tmp_path):
+    assert set(figures.ON_REQUEST) == {"density", "response", "final"}
+    run = synthetic_run.results(tmp_path, {"first": 1.0, "second": 1.1})
+    assert "final-x" not in {path.stem for path in figures.draw(run)}
+    assert "final-x" in {path.stem for path in figures.draw(run, ["final"])}
 
 
 def test_only_the_figures_asked_for_are_drawn(tmp_path):
