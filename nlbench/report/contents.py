@@ -23,7 +23,9 @@ def contents(results: Results, drawn: list[Path]) -> dict[str, Any]:
     statistic = "rms_clipped" if read.any_diverged else "rms"
     found = winners.winners(read, statistic)
     last = max((winner.time for winner in found), default=0.0)
-    optional = {name: results.table(name) for name in ("claims", "cost", "moments") if name in results.tables}
+    optional = {
+        name: results.table(name) for name in ("claims", "sets", "cost", "moments") if name in results.tables
+    }
     return {
         "question": experiment.question or experiment.experiment,
         "experiment": experiment.experiment,
@@ -31,6 +33,9 @@ def contents(results: Results, drawn: list[Path]) -> dict[str, Any]:
         "source": _source(read, experiment, statistic),
         "summary": _summary(results),
         "claims": tables.claims(optional["claims"]) if len(optional.get("claims", ())) else None,
+        "sets": tables.sets(optional["sets"], experiment.source.runs)
+        if len(optional.get("sets", ()))
+        else None,
         "best": tables.best(found, read) if found and len(read.filters) > 1 else None,
         "errors": [
             table

@@ -60,6 +60,16 @@ def percent(fraction: float) -> str:
     return f"{value:.{max(0, 1 - math.floor(math.log10(abs(value))))}f}" if value else "0"
 
 
+def share(fraction: float, low: float, high: float) -> str:
+    """`93 % [88, 96]`: a fraction in percent with its interval."""
+    return f"{percent(fraction)}\u00a0% [{percent(low)}, {percent(high)}]"
+
+
+def ranged(value: float, low: float, high: float) -> str:
+    """`−0.01 [−0.02, 0.005]`: a number with its interval."""
+    return f"{plain(value, 3)} [{plain(low, 3)}, {plain(high, 3)}]"
+
+
 def duration(seconds: float) -> str:
     """`12.3 s`, `4.5 min` or `2.1 h`."""
     for unit, size in (("h", 3600), ("min", 60)):

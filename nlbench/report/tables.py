@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from nlbench.figures.data import Data
-from nlbench.report.numbers import listed, measured, percent, plain, uncertain
+from nlbench.report.numbers import listed, measured, percent, plain, ranged, share, uncertain
 from nlbench.report.winners import WORDS, Winner
 
 LONG = 30  # letters
@@ -24,11 +24,12 @@ COST = {
 
 
 class Cell(NamedTuple):
-    """Text, the value to sort by, and a class for the style sheet."""
+    """Text, the value to sort by, classes for the style sheet, and where the text leads if it is a link."""
 
     text: str
     key: float | str
     kind: str = ""
+    address: str = ""
 
 
 class Table(NamedTuple):
@@ -94,7 +95,7 @@ def divergence(data: Data) -> Table:
     """How many runs of each filter diverged, and how often its guard fired."""
     rows = []
     for row in data.divergence.to_dict("records"):
-        fraction = f"{percent(row['fraction'])}\u00a0% [{percent(row['low'])}, {percent(row['high'])}]"
+        fraction = share(row["fraction"], row["low"], row["high"])
         guarded = f"{row['guarded']:,.0f}" if row["guarded"] else "–"
         if row.get("guarded_fraction", 0) > 0:
             guarded += f" ({percent(row['guarded_fraction'])}\u00a0%)"
@@ -152,7 +153,6 @@ def claims(table: pd.DataFrame) -> Table:
     """The verdict on each claim."""
     rows = []
     for row in table.to_dict("records"):
-        interval = f"{plain(row['estimate'], 3)} [{plain(row['low'], 3)}, {plain(row['high'], 3)}]"
         rows.append(
             [
                 name(row["id"]),
@@ -160,12 +160,32 @@ def claims(table: pd.DataFrame) -> Table:
                     VERDICTS.get(row["verdict"], row["verdict"]), row["verdict"], f"verdict {row['verdict']}"
                 ),
                 prose(row["says"]),
-                number(interval, row["estimate"]),
+                name(row["whose"]),
+                prose(row["where"] or "–"),
+                number(ranged(row["estimate"], row["low"], row["high"]), row["estimate"]),
                 number(f"{row['n']:,.0f}", row["n"]),
             ]
         )
-    heads = ["claim", "verdict", "in words", "weakest difference [95 % interval]", "runs"]
+    heads = ["claim", "verdict", "in words", "whose", "where", "weakest margin [95 % interval]", "runs"]
     return Table("claims", "Claims of the experiment file, tested on common random numbers", heads, rows)
+
+
+def sets(table: pd.DataFrame, source_runs: int | None) -> Table:
+    """How often sets of few of the runs show each claim."""
+    sizes = sorted(set(table["runs"]))
+    heads = [f"sets of {size:,}{' (as the source)' * (size == source_runs)}" for size in sizes]
+    found = {(row["id"], row["runs"]): row for row in table.to_dict("records")}
+    rows = [
+        [name(claim), *(_share(found.get((claim, size))) for size in sizes)]
+        for claim in dict.fromkeys(table["id"])
+    ]
+    return Table("sets", "How often sets of so few runs show each claim", ["claim", *heads], rows)
+
+
+def _share(row: dict[str, Any] | None) -> Cell:
+    if row is None:
+        return number("–", math.nan)
+    return number(f"seen in {share(row['share'], row['low'], row['high'])}", row["share"])
 
 
 def cost(table: pd.DataFrame) -> Table:

@@ -3,42 +3,16 @@
 from __future__ import annotations
 
 import re
-from html.parser import HTMLParser
 from urllib.parse import unquote
 
 import pytest
 
 from nlbench import report
 from tests import synthetic_run
+from tests.browser import ABSENT, EXECUTABLE, Browser, Tab
+from tests.parsed_page import Page
 
 QUICK = {"figures": ["mean_error"]}  # of experiments whose figures are not looked at
-VOID = {"meta", "link", "br", "img", "input", "hr"}
-
-
-class Page(HTMLParser):
-    """Elements with their attributes, text, and whether every element is closed."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.elements, self.open, self.text = [], [], ""
-        self.feed(text)
-
-    def handle_starttag(self, tag, attributes):
-        self.elements.append((tag, dict(attributes)))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attributes):
-        self.elements.append((tag, dict(attributes)))
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, text):
-        self.text += text
-
-    def all(self, tag):
-        return [attributes for name, attributes in self.elements if name == tag]
 
 
 def written(run):
@@ -51,6 +25,7 @@ def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     tables = {
         "claims": synthetic_run.claims(),
+        "sets": synthetic_run.sets(),
         "cost": synthetic_run.cost(),
         "consistency": synthetic_run.consistency(synthetic_run.FACTORS, 20_000),
     }
@@ -142,6 +117,21 @@ def test_consistency_is_told_in_words(page):
     assert "1.000 ± 0.010, selected" in rows["third-order-guarded"]
 
 
+def test_each_claim_says_whose_it_is_and_how_often_few_runs_show_it(page, tmp_path):
+    section = page[1].split('<section id="claims">')[1].split("</section>")[0]
+    for part in ("section 7.3, page 7-9", ">source<", ">ours<", "sets of 10<", "sets of 80 (as the source)"):
+        assert part in section
+    seen = re.findall(r'class="number">(seen in [^<]*|–)</td>', section)
+    assert seen == [
+        "seen in 63\u00a0% [61, 65]",
+        "seen in 93\u00a0% [89, 96]",
+        "–",
+        "seen in 0\u00a0% [0, 1.5]",
+    ]
+    without = synthetic_run.results(tmp_path, tables={"claims": synthetic_run.claims()}, **QUICK)
+    assert "seen in" not in written(without)[1]
+
+
 def test_divergence_is_counted_in_words(page, tmp_path):
     assert "37 of 20,000" in page[1]
     assert "Some runs diverged" in page[1]
@@ -179,3 +169,17 @@ def test_a_run_in_which_all_failed_says_so(tmp_path):
     text = written(synthetic_run.results(tmp_path, factors, diverged={"third-order": 20_000}, **QUICK))[1]
     assert "No filter gave a usable estimate" in text
     assert ">failed</td>" in text
+
+
+@pytest.mark.skipif(not EXECUTABLE, reason=ABSENT)
+def test_a_browser_shows_it_without_complaint_and_sorts_its_tables(page):
+    with Browser() as browser:
+        tab = Tab(browser, page[0], width=360, height=800)
+        rows = "[...document.querySelectorAll('#errors tbody tr th')].map(head => head.textContent)"
+        before = tab.run(rows)
+        tab.run("document.querySelector('#errors thead button').focus()")
+        tab.press("Enter")
+        assert tab.run(rows) != before
+        assert not tab.complaints
+        assert tab.requests == [page[0].as_uri()]
+        assert tab.run("document.documentElement.scrollWidth") <= 360
