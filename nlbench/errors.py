@@ -58,7 +58,7 @@ class ConfigError(NlbenchError):
 
 
 class GateError(NlbenchError):
-    """A claim that the experiment makes was not confirmed, and the user asked for that to fail."""
+    """A claim was not confirmed and the user asked for that to fail, or a verdict is not the one on record."""
 
     exit_code = 3
 

@@ -52,6 +52,10 @@ class NominalOptions(Options):
 class WeightedOptions(Options):
     """Options of the filter that weighs errors with exp(-k |x - xhat|^2)."""
 
+    equations: Literal["corrected"] = Field(
+        default="corrected",
+        description="the printed (66) has P where P^-1 belongs, which is a misprint and no filter",
+    )
     k: NonNegativeFloat = Field(default=0.0, description="the weight's k; 0 weighs all errors alike")
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from nlbench import filters, schedule, systems
 from nlbench.config.schema import PARTICLES
 from nlbench.errors import ConfigError
+from nlbench.errors import Problem as Mistake
 from nlbench.moments.moments import Moments
 from nlbench.simulate import path
 from nlbench.statistics.layout import Layout
@@ -90,7 +91,7 @@ def _check_claims(experiment: Experiment, layout: Layout) -> None:
         for component in layout.components(order)
     ]
     problems = [
-        f"claims.{claim.id}: the system has no {what} '{name}'{suggestion(name, names)}"
+        Mistake(f"claims.{claim.id}: the system has no {what} '{name}'{suggestion(name, names)}")
         for claim in experiment.claims
         for what, names, given in (
             ("coordinate", coordinates, [claim.coordinate] if claim.coordinate else []),

@@ -3,7 +3,7 @@
 Every form of a claim is a *margin* that is negative where the claim holds:
 
     less        factor a - b                     a, b: the statistic of two neighbours in the list
-    less        |a/A - 1| - |b/B - 1|            with agrees_with: A, B the other statistic of the same filters
+    less        factor |a/A - 1| - |b/B - 1|     with agrees_with: A, B the other statistic of the same filters
     equal       |a - b| - within |b|
     below       a - below
     above       above - a
@@ -111,7 +111,7 @@ class Term(NamedTuple):
             case "less" | "less_than":
                 return self.constant * a - b
             case "closer":
-                return abs(a / others[1] - 1) - abs(b / others[2] - 1)
+                return self.constant * abs(a / others[1] - 1) - abs(b / others[2] - 1)
             case "equal" | "agrees_with":
                 return abs(a - b) - self.constant * abs(b)
             case "below":
@@ -135,7 +135,7 @@ def terms(claim: Claim, first_coordinate: str, times: Sequence[float]) -> Iterat
                     yield Term("equal", two, claim.within or 0.0)
                 elif claim.agrees_with:
                     others = tuple(quantity(label, time, claim.agrees_with) for label in (a, b))
-                    yield Term("closer", (*two, *others), 0.0)
+                    yield Term("closer", (*two, *others), claim.factor or 1.0)
                 else:
                     yield Term("less", two, claim.factor or 1.0)
             continue
@@ -220,7 +220,7 @@ def _stderr(term: Term, found: list[Known], margin: float) -> float:
         case "agrees_with":
             return a.stderr + (1 + constant) * others[0].stderr
         case "closer":
-            return math.hypot(_of_ratio(a, others[1]), _of_ratio(others[0], others[2]))
+            return math.hypot(constant * _of_ratio(a, others[1]), _of_ratio(others[0], others[2]))
         case _:
             return a.stderr
 

@@ -24,6 +24,7 @@ MODULES = {
     "parameter-identification": "nlbench.systems.parameter_identification",
     "state-dependent-noise": "nlbench.systems.state_dependent_noise",
     "positiveness": "nlbench.systems.positiveness",
+    "rippled-sensor": "nlbench.systems.rippled_sensor",
     "ungm": "nlbench.systems.growth",
     "bearings-only": "nlbench.systems.bearings_only",
     "re-entry": "nlbench.systems.reentry",

@@ -103,6 +103,9 @@ def test_which_of_two_filters_knows_its_variance_better():
     row = judged(values, less=["a", "b"], **form)
     assert (row["verdict"], row["estimate"]) == ("confirmed", pytest.approx(0.05 - 0.4))
     assert judged(values, less=["b", "a"], **form)["verdict"] == "refuted"
+    row = judged(values, less=["a", "b"], factor=2, **form)
+    assert (row["verdict"], row["estimate"]) == ("confirmed", pytest.approx(0.1 - 0.4))
+    assert judged(values, less=["b", "a"], factor=2, **form)["verdict"] == "refuted"
 
 
 @pytest.mark.parametrize("lost", [0, 1, 3])
