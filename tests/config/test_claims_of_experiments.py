@@ -1,4 +1,4 @@
-"""Claim: each of the thesis's figures is spoken of by a claim of its own; an erratum is one question with few filters."""
+"""Claim: each of the thesis's figures has a claim of its own; an erratum is one question with few filters."""
 
 from __future__ import annotations
 
