@@ -52,11 +52,13 @@ def write(folder: Path, runs: int = 300, below: float = 0.01) -> Path:
     return folder
 
 
+SOURCE = Source(name="small-1970", title="Small things", citation="A. Author, 1970", entries=ENTRIES)
+
+
 def install() -> None:
     """Put the source in the place of the package's own."""
-    source = Source(name="small-1970", title="Small things", citation="A. Author, 1970", entries=ENTRIES)
     documents.NAMES = ("small-1970",)
-    documents.source = lambda name: source
+    documents.source = lambda name: SOURCE
     documents.errors = lambda: (ERROR.model_copy(update={"document": "small-1970"}),)
 
 

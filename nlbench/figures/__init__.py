@@ -49,8 +49,11 @@ def draw(results: Results, names: Sequence[str] | None = None) -> list[Path]:
     as its tables allow. Pictures that the run no longer has are removed: of the kinds named, by default of all kinds.
     Raises `ConfigError` for an unknown name.
     """
-    kinds = names or FIGURES
-    names = names or results.experiment.figures or [name for name in FIGURES if name not in ON_REQUEST]
+    kinds = FIGURES if names is None else names
+    if names is None:
+        names = results.experiment.figures
+    if names is None:
+        names = [name for name in FIGURES if name not in ON_REQUEST]
     unknown = [name for name in names if name not in FIGURES]
     if unknown:
         raise ConfigError(f"unknown figure {', '.join(map(repr, unknown))}; known: {', '.join(FIGURES)}")

@@ -98,7 +98,8 @@ def done(job: Job) -> bool:
 
 def _start(job: Job, out: Path) -> _Running:
     # A process group of its own: Ctrl-C reaches it through us, once, and not from the terminal as well.
-    options = ["--runs", str(job.runs), "--out", str(out), "--json", "--set", "engine.threads=1"]
+    options = ["--runs", str(job.runs), "--out", str(out), "--json"]
+    options += [part for each in ("engine.threads=1", *job.settings) for part in ("--set", each)]
     complaints = tempfile.TemporaryFile()  # noqa: SIM115 - closed when the process has ended
     process = subprocess.Popen(
         [sys.executable, "-m", "nlbench", "run", str(job.file), *options],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -30,12 +29,19 @@ class Chosen(NamedTuple):
         of_errors = [name for error in self.errors for name in error.experiments]
         return tuple(dict.fromkeys([*of_entries, *of_errors]))
 
+    def figures(self, experiment: str) -> tuple[str, ...]:
+        """The kinds of figures of which the entries show pictures of this experiment."""
+        items = [item for _, items in self.entries for item in items if experiment in item.experiments]
+        return tuple(dict.fromkeys(name.split("-")[0] for item in items for name in item.pictures))
+
 
 class Job(NamedTuple):
-    """One experiment to run: its file, what it says, how many runs, and the folder of its results."""
+    """One experiment to run: its file and settings of this call, what they say, how many runs, and the folder of its
+    results."""
 
     name: str
     file: Path
+    settings: tuple[str, ...]
     experiment: Experiment
     runs: int
     folder: Path
@@ -71,10 +77,11 @@ def _is(item: Item, wanted: str) -> bool:
     return wanted.casefold() in (item.number.casefold(), f"{item.kind} {item.number}".casefold())
 
 
-def jobs(names: Iterable[str], configs: Path, out: Path, most_runs: int | None = None) -> list[Job]:
-    """The jobs of these experiments. Raises `ConfigError` with all that is wrong with their files.
+def jobs(chosen: Chosen, configs: Path, out: Path, quick: bool = False) -> list[Job]:
+    """The jobs of all that is chosen. Raises `ConfigError` with all that is wrong with the files.
 
-    most_runs: no experiment makes more; None: as its file says.
+    quick: no experiment makes more than `QUICK_RUNS`, and only those figures are drawn that entries show, since drawing
+    the others takes longer than so few runs; otherwise as the files say.
     """
     from nlbench.config import load
 
@@ -83,16 +90,17 @@ def jobs(names: Iterable[str], configs: Path, out: Path, most_runs: int | None =
         raise ConfigError(
             f"no folder '{configs}' here; name the folder of the experiments with --configs DIR"
         )
-    for name in names:
+    for name in chosen.experiments:
         file = configs / f"{name}.yaml"
+        settings = (f"figures=[{', '.join(chosen.figures(name))}]",) if quick else ()
         try:
-            experiment = load(file)
+            experiment = load(file, settings)
         except ConfigError as error:
             problems += error.problems
             continue
         runs = experiment.monte_carlo.runs
         folder = out / experiment.experiment / experiment.hash12()
-        found.append(Job(name, file, experiment, min(runs, most_runs or runs), folder))
+        found.append(Job(name, file, settings, experiment, min(runs, QUICK_RUNS) if quick else runs, folder))
     if problems:
         raise ConfigError(problems)
     return found

@@ -74,8 +74,7 @@ class Done(NamedTuple):
 def plan(wanted: Wanted) -> tuple[jobs.Chosen, list[Job]]:
     """What is to be reproduced and the experiments that it needs. Raises `ConfigError`."""
     chosen = jobs.choose(wanted.source, wanted.figure)
-    most = jobs.QUICK_RUNS if wanted.quick else None
-    return chosen, jobs.jobs(chosen.experiments, wanted.configs, wanted.out, most)
+    return chosen, jobs.jobs(chosen, wanted.configs, wanted.out, wanted.quick)
 
 
 def reproduce(

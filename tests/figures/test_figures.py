@@ -104,6 +104,10 @@ def test_what_is_drawn_on_request_is_not_drawn_without_one(tmp_path):
     assert "final-x" in {path.stem for path in figures.draw(run, ["final"])}
 
 
+def test_an_empty_list_of_figures_draws_none(tmp_path):
+    assert figures.draw(synthetic_run.results(tmp_path, figures=[])) == []
+
+
 def test_only_the_figures_asked_for_are_drawn(tmp_path):
     run = synthetic_run.results(tmp_path, figures=["mean_error"])
     assert {path.stem for path in figures.draw(run)} == {"mean_error-x"}

@@ -17,6 +17,7 @@ from nlbench.reproduce.recorded import Compared, Row
 from tests import small_source, synthetic_run
 
 NOTHING = Compared(0, (), 0, 0)
+CHOSEN = jobs.Chosen(((small_source.SOURCE, small_source.ENTRIES),), ())
 CHANGED = (
     Row("full", "small-1970", "figure 1", "300", "DIFFERS"),
     Row("full", "small-1970", "figure 1", "300", "REPRODUCED"),
@@ -26,7 +27,7 @@ CHANGED = (
 @pytest.fixture
 def two(tmp_path):
     """Jobs of two experiments that have not been run."""
-    return jobs.jobs(["small-a", "small-b"], small_source.write(tmp_path / "configs"), tmp_path / "out")
+    return jobs.jobs(CHOSEN, small_source.write(tmp_path / "configs"), tmp_path / "out")
 
 
 def run(jobs, tmp_path):
@@ -41,6 +42,25 @@ def test_each_failure_is_told_with_its_exit_code_and_complaint(two, tmp_path):
     assert {each.job.name for each in seen} == set(outcomes) == {"small-a", "small-b"}
     assert [each.code for each in outcomes.values()] == [2, 2]
     assert all("no such file" in each.fault for each in outcomes.values())
+
+
+def test_a_quick_run_is_of_fewer_runs_and_draws_what_entries_show(tmp_path):
+    configs = small_source.write(tmp_path / "configs", runs=5000)
+    full, quick = (jobs.jobs(CHOSEN, configs, tmp_path / "out", quick) for quick in (False, True))
+    assert [job.runs for job in full] == [5000, 5000]
+    assert [job.runs for job in quick] == [2048, 2048]
+    assert [job.settings for job in full] == [(), ()]
+    assert [job.experiment.figures for job in quick] == [["rms", "trace"], ["rms"]]
+    assert [job.folder for job in quick] == [job.folder for job in full]
+
+
+def test_settings_reach_the_run(tmp_path):
+    configs = small_source.write(tmp_path / "configs", runs=70)
+    job = jobs.jobs(CHOSEN, configs, tmp_path / "out", quick=True)[1]
+    outcomes, _ = run([job], tmp_path)
+    assert outcomes["small-b"].code == 0
+    assert {path.name for path in (job.folder / "figures").iterdir()} == {"rms-x.svg", "rms-x.png"}
+    assert driver.done(job)
 
 
 def test_what_is_done_is_not_run_again(two, tmp_path, monkeypatch):
@@ -62,7 +82,7 @@ def test_the_longest_begins_first(two, tmp_path, monkeypatch):
 def test_a_run_is_done_when_its_results_are_sound_read_alike_and_of_as_many_runs(tmp_path):
     results = synthetic_run.results(tmp_path / "run", runs=500)
     (results.path / "report.html").write_text("")
-    job = jobs.Job("tests/synthetic", tmp_path / "file.yaml", results.experiment, 500, results.path)
+    job = jobs.Job("tests/synthetic", tmp_path / "file.yaml", (), results.experiment, 500, results.path)
     assert driver.done(job)
     assert not driver.done(job._replace(runs=501))
     other = results.experiment.model_copy(update={"traces": [0]})

@@ -54,7 +54,7 @@ def made(tmp_path):
     (results.path / "figures" / "rms-x.svg").write_text(svg)
     file = tmp_path / "file.yaml"
     file.write_text("# Which?\n# chosen: all\n")
-    job = Job("culver/here", file, results.experiment, 20_000, results.path)
+    job = Job("culver/here", file, (), results.experiment, 20_000, results.path)
     lost = job._replace(name="culver/lost", folder=tmp_path / "nowhere")
     entries = (
         *(
