@@ -1,6 +1,9 @@
-"""What holds for all tests: shapes and types are enforced, and numbers are double precision."""
+"""What holds for all tests: shapes and types are enforced, numbers are double precision, programs compile once."""
 
 from __future__ import annotations
+
+import os
+import tempfile
 
 from jaxtyping import install_import_hook
 
@@ -13,3 +16,16 @@ install_import_hook([f"nlbench.{package}" for package in NUMERICAL.split()], "be
 import jax  # noqa: E402 - the hook comes first
 
 jax.config.update("jax_enable_x64", True)
+
+
+def pytest_configure(config):
+    """One cache of compiled programs for all workers and every process that a test starts, empty at the beginning.
+
+    jax decides at its first compilation whether it has a cache, so it is named before. A caller's own is used and kept.
+    """
+    if "NLBENCH_CACHE" not in os.environ:
+        folder = tempfile.TemporaryDirectory(prefix="nlbench-tests-")
+        config.add_cleanup(folder.cleanup)
+        os.environ["NLBENCH_CACHE"] = folder.name
+    jax.config.update("jax_compilation_cache_dir", os.environ["NLBENCH_CACHE"])
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)

@@ -9,8 +9,10 @@ import sys
 import time
 
 import pytest
+from jax.experimental.compilation_cache import compilation_cache
 
 import nlbench as nb
+from nlbench.engine.compiled import use_cache
 from nlbench.results.results import Results
 from tests.small_runs import experiment, python, table_bytes
 
@@ -26,7 +28,14 @@ nb.run(experiment(monte_carlo={"runs": runs, "seed": 11}), out)
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    return nb.run(experiment(), tmp_path_factory.mktemp("plain"))
+    """With a cache of its own, so that what it is compared with was compiled another time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("NLBENCH_CACHE", str(tmp_path_factory.mktemp("cache")))
+        compilation_cache.reset_cache()
+        results = nb.run(experiment(), tmp_path_factory.mktemp("plain"))
+    use_cache()
+    compilation_cache.reset_cache()
+    return results
 
 
 @pytest.mark.parametrize("engine", [{"chunk": 1}, {"chunk": 7, "threads": 1}, {"chunk": 79, "threads": 3}])
@@ -66,20 +75,22 @@ def test_block_and_precision_make_another_experiment():
 
 
 @pytest.mark.slow
-def test_killed_at_any_moment_and_resumed_gives_the_same_bytes(tmp_path):
+@pytest.mark.parametrize("kills", [8, pytest.param(60, marks=pytest.mark.long)])
+def test_killed_at_any_moment_and_resumed_gives_the_same_bytes(tmp_path, kills):
+    """Killed up to so many times, at the first checkpoint after each start or up to 0.09 s later."""
     program = RUN.replace("import sys\n", "import sys\nimport nlbench.engine.driver as driver\n", 1)
     program = program.replace("nb.configure()", "nb.configure()\ndriver.SECONDS_BETWEEN_CHECKPOINTS = 0.05")
     runs = "150000"
     assert python(program, runs, str(tmp_path / "straight")).returncode == 0
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "XLA_FLAGS": ""}
     killed = 0
-    for attempt in range(60):
+    for attempt in range(kills + 1):
         process = subprocess.Popen(
             [sys.executable, "-c", program, runs, str(tmp_path / "killed")], env=environment
         )
         checkpoints = lambda: sum(p.stat().st_mtime_ns for p in tmp_path.glob("killed/*/*/batches/*.npz"))  # noqa: E731
         before = checkpoints()
-        while process.poll() is None and checkpoints() == before:
+        while process.poll() is None and (attempt == kills or checkpoints() == before):
             time.sleep(0.005)
         time.sleep(0.03 * (attempt % 4))
         if process.poll() is not None:

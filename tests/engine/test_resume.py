@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import shutil
 import signal
 
 import pytest
@@ -11,12 +12,19 @@ import nlbench as nb
 from nlbench.engine import driver
 from nlbench.errors import EnvironmentFault, Interrupted, LockedError
 from nlbench.results.folder import RunFolder
+from nlbench.results.results import Results
 from tests.small_runs import experiment, python, table_bytes
 
 
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    return nb.run(experiment(), tmp_path_factory.mktemp("finished")).path
+
+
 @pytest.fixture
-def done(tmp_path):
-    return nb.run(experiment(), tmp_path)
+def done(finished, tmp_path):
+    """A copy of the finished run, to be spoiled."""
+    return Results(shutil.copytree(finished, tmp_path / finished.parent.name / finished.name))
 
 
 class InterruptOnce:
