@@ -39,7 +39,7 @@ run: $(VENV)/run.stamp
 	@$(BIN)/nlbench run $(EXPERIMENT) $(OPTIONS)
 
 test: $(VENV)/dev.stamp
-	@$(BIN)/python -m pytest --numprocesses auto --dist loadfile $(PYTEST_OPTIONS)
+	@$(BIN)/python -m pytest --numprocesses auto --dist worksteal $(PYTEST_OPTIONS)
 
 check: format lint types test
 

@@ -8,7 +8,7 @@ import pytest
 import nlbench as nb
 
 
-@pytest.mark.parametrize("name", ["ensemble", "bootstrap"])
+@pytest.mark.parametrize("name", [pytest.param("ensemble", marks=pytest.mark.long), "bootstrap"])
 def test_errors_of_sampling_are_independent_from_run_to_run(name, tmp_path):
     """Against the Kalman filter on the same linear data; with common draws the differences would be nearly equal."""
     system = {"name": "culver-scalar", "dynamics": "linear", "decay": 0.5}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import jax
 import numpy as np
 import pytest
@@ -30,34 +32,38 @@ def followed(problem, seed):
     return jax.jit(lambda lanes: block_tracks(problem, words(seed), lanes, 0)[0])(lanes)
 
 
-def data(problem, seed, number):
-    run = Trajectory(*words(number), *words(number), np.int32(0))
-    return simulate(problem.truth, problem.schedule, seed_key(*words(seed)), run)
+def simulated(problem, seed):
+    """A function of a trajectory's number: its states and measurements."""
+    run = jax.jit(partial(simulate, problem.truth, problem.schedule, seed_key(*words(seed))))
+    return lambda number: run(Trajectory(*words(number), *words(number), np.int32(0)))
 
 
-def by_hand(f, initial, y, interval, limiter=None):
-    """(NIS or None, log-likelihood) of each update of a trajectory, from the public interface and NumPy."""
+def by_hand(f, initial, interval, limiter=None):
+    """Of a trajectory's y: (NIS or None, log-likelihood) of each update, from the public interface and NumPy."""
     predict = jax.jit(lambda state, t: f.predict(state, t, t + interval))
     update = jax.jit(f.update)
-    state, found = f.init(initial), []
-    for k in range(len(y)):
-        state, info = update(predict(state, k * interval), (k + 1) * interval, y[k])
-        z, S = np.asarray(info.innovation), np.asarray(info.innovation_cov)
-        clipped = limiter is not None and (np.abs(z) > limiter * np.sqrt(np.diagonal(S))).any()
-        fit = not clipped and not info.guarded and (np.linalg.eigvalsh(S) > 0).all()
-        found.append((z @ np.linalg.solve(S, z) if fit else None, float(info.log_likelihood)))
-    return found
+
+    def follow(y):
+        state, found = f.init(initial), []
+        for k in range(len(y)):
+            state, info = update(predict(state, k * interval), (k + 1) * interval, y[k])
+            z, S = np.asarray(info.innovation), np.asarray(info.innovation_cov)
+            clipped = limiter is not None and (np.abs(z) > limiter * np.sqrt(np.diagonal(S))).any()
+            fit = not clipped and not info.guarded and (np.linalg.eigvalsh(S) > 0).all()
+            found.append((z @ np.linalg.solve(S, z) if fit else None, float(info.log_likelihood)))
+        return found
+
+    return follow
 
 
 def test_scores_are_those_of_a_plain_loop():
     problem = make(experiment(**OSCILLATOR))
     scores = followed(problem, 5).scores
-    some_left_out = set()
-    for number in range(0, 64, 9):
-        y = np.asarray(data(problem, 5, number).measurements)
-        for place, runner in enumerate(problem.runners):
-            limiter = 1.0 if runner.label == "limited" else None
-            expected = by_hand(runner.filter, runner.initial, y, 0.1, limiter)
+    data, some_left_out = simulated(problem, 5), set()
+    for place, runner in enumerate(problem.runners):
+        follow = by_hand(runner.filter, runner.initial, 0.1, 1.0 if runner.label == "limited" else None)
+        for number in range(0, 64, 9):
+            expected = follow(np.asarray(data(number).measurements))
             for output in range(1, 4):
                 part = [nis for nis, _ in expected[4 * (output - 1) : 4 * output]]
                 counted = [nis for nis in part if nis is not None]
@@ -115,7 +121,7 @@ def test_sightings_are_scored_as_each_lane_makes_them():
     tracks = followed(problem, SEED)
     np.testing.assert_array_equal(tracks.scores.samples.sum(1), tracks.updates)
     number = 11
-    run = data(problem, SEED, number)
+    run = simulated(problem, SEED)(number)
     states, noise = np.asarray(run.states), np.asarray(run.noise)
     f = problem.runners[1].filter
     predict = jax.jit(lambda state, t: f.predict(state, t, t + STEP))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -62,24 +63,28 @@ class ByHand(NamedTuple):
     steps: list[int]
 
 
-def by_hand(system, name, states, noise, nominal_steps=None):
-    """One trajectory through the public interface, decided in Python."""
+def by_hand(system, name):
+    """Follows a trajectory of given states and noise through the public interface, decided in Python: a `ByHand`."""
     f = nb.filters.build(name, system)
     predict = jax.jit(lambda state, t: f.predict(state, t, t + STEP))
     update = jax.jit(lambda state, t, y, number: f.update(state, t, y, sighting=number)[0])
-    state, angle, made, errors = f.init(system.initial), 0.0, [], []
-    for step in range(1, round(END / STEP) + 1):
-        state, x = predict(state, (step - 1) * STEP), states[step]
-        angle += math.remainder(float(f.moments(state).mean[0]) - angle, 2 * math.pi)
-        turn, place = divmod(len(made), 3)
-        due = angle >= system.sightings.angles[place] + 2 * math.pi * turn
-        if step == nominal_steps[len(made)] if nominal_steps else due:
-            y = x[0] * x[1] + system.sightings.marks[place] * x[0] + noise[len(made)]
-            state = update(state, step * STEP, y, len(made))
-            made.append(step)
-        if step % round(1.0 / STEP) == 0:
-            errors.append(x - np.asarray(f.moments(state).mean))
-    return ByHand(np.array(errors), made)
+
+    def follow(states, noise, nominal_steps=None):
+        state, angle, made, errors = f.init(system.initial), 0.0, [], []
+        for step in range(1, round(END / STEP) + 1):
+            state, x = predict(state, (step - 1) * STEP), states[step]
+            angle += math.remainder(float(f.moments(state).mean[0]) - angle, 2 * math.pi)
+            turn, place = divmod(len(made), 3)
+            due = angle >= system.sightings.angles[place] + 2 * math.pi * turn
+            if step == nominal_steps[len(made)] if nominal_steps else due:
+                y = x[0] * x[1] + system.sightings.marks[place] * x[0] + noise[len(made)]
+                state = update(state, step * STEP, y, len(made))
+                made.append(step)
+            if step % round(1.0 / STEP) == 0:
+                errors.append(x - np.asarray(f.moments(state).mean))
+        return ByHand(np.array(errors), made)
+
+    return follow
 
 
 @pytest.fixture(scope="module")
@@ -88,10 +93,16 @@ def results(tmp_path_factory):
     return system, nb.run(stated(system), tmp_path_factory.mktemp("turning"))
 
 
-def simulated(system, number):
+def simulated(system):
+    """The problem, and a function of a trajectory's number: its states and the noise of its sightings."""
     problem = make(experiment(**{**stated(system), "system": {"name": "own"}, "reference": None}), system)
-    run = simulate(problem.truth, problem.schedule, seed_key(*words(SEED)), trajectory(number))
-    return np.asarray(run.states), np.asarray(run.noise), problem
+    run = jax.jit(partial(simulate, problem.truth, problem.schedule, seed_key(*words(SEED))))
+
+    def states_and_noise(number):
+        made = run(trajectory(number))
+        return np.asarray(made.states), np.asarray(made.noise)
+
+    return problem, states_and_noise
 
 
 def trajectory(number):
@@ -101,11 +112,12 @@ def trajectory(number):
 def test_each_filter_sights_at_its_own_steps_with_the_noise_of_the_number(results):
     system, done = results
     kept = done.table("runs").set_index(["filter", "run", "time"])
+    _, data = simulated(system)
     schedules = set()
-    for number in range(0, 100, 25):
-        states, noise, _ = simulated(system, number)
-        for name in FILTERS:
-            expected = by_hand(system, name, states, noise)
+    for name in FILTERS:
+        follow = by_hand(system, name)
+        for number in range(0, 100, 25):
+            expected = follow(*data(number))
             schedules.add((name, *expected.steps))
             found = kept.loc[name, number, END]
             np.testing.assert_allclose([found.x1, found.x2], expected.errors[-1], rtol=1e-9, atol=1e-11)
@@ -116,7 +128,7 @@ def test_each_filter_sights_at_its_own_steps_with_the_noise_of_the_number(result
 def test_nominal_sightings_are_made_when_the_undisturbed_motion_says_so(tmp_path):
     system = turning(nominal=True, step=STEP)
     kept = nb.run(stated(system), tmp_path).table("runs").set_index(["filter", "run", "time"])
-    states, noise, problem = simulated(system, 7)
+    problem, data = simulated(system)
     path = simulate(
         turning(sample=lambda key: jnp.array([0.0, RATE])),
         problem.schedule,
@@ -126,7 +138,7 @@ def test_nominal_sightings_are_made_when_the_undisturbed_motion_says_so(tmp_path
     due = [angle + 2 * math.pi * turn for turn in range(5) for angle in (1.0, 2.5, 5.0)]
     steps = [int(np.argmax(np.asarray(path)[:, 0] >= angle)) for angle in due]
     for name in FILTERS:
-        expected = by_hand(system, name, states, noise, nominal_steps=[step or -1 for step in steps])
+        expected = by_hand(system, name)(*data(7), nominal_steps=[step or -1 for step in steps])
         found = kept.loc[name, 7, END]
         np.testing.assert_allclose([found.x1, found.x2], expected.errors[-1], rtol=1e-9, atol=1e-11)
         assert expected.steps == [step for step in steps if step]
@@ -140,23 +152,23 @@ def test_chunks_and_threads_do_not_change_one_bit(results, tmp_path):
 
 def test_updates_are_counted_as_each_lane_makes_them(results):
     system, _ = results
-    _, _, problem = simulated(system, 0)
+    problem, data = simulated(system)
     lanes = make_chunk(problem, 0, 1, 1, 64).lanes
     tracks = jax.jit(lambda lanes: block_tracks(problem, words(SEED), lanes, 0)[0])(
         jax.tree.map(lambda part: part[0], lanes)
     )
+    hands = [by_hand(system, name) for name in FILTERS]
     for number in (0, 63):
-        states, noise, _ = simulated(system, number)
-        made = [len(by_hand(system, name, states, noise).steps) for name in FILTERS]
+        made = [len(follow(*data(number)).steps) for follow in hands]
         assert tracks.updates[:, number].tolist() == made
 
 
 def test_a_late_error_is_judged_at_the_end_over_its_window(tmp_path):
     system, window = turning(step=STEP), 3.0
-    late = {}
+    _, data = simulated(system)
+    follow, late = by_hand(system, "linearised-kalman"), {}
     for number in range(0, 100, 9):
-        states, noise, _ = simulated(system, number)
-        errors = by_hand(system, "linearised-kalman", states, noise).errors[:, 0]
+        errors = follow(*data(number)).errors[:, 0]
         late[number] = np.sqrt((errors[-round(window) :] ** 2).mean())
     bound = float(np.median(list(late.values())))
     ruled = turning(step=STEP, diverged_late=LateError(window, bound, members=(0,)))
