@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 SECONDS_BETWEEN_CHECKPOINTS = 5.0
+SECONDS_OF_A_CALL = 1.0
 CHECKPOINT_SHARE = 30  # ... or more, so that writing large ones takes a thirtieth of the time
 
 
@@ -129,15 +130,28 @@ def _in_order(
     chunk: int,
     stopped: Callable[[], bool],
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Sums of blocks first ... last - 1 in order, computed by threads that run ahead; ends early when stopped."""
-    size = min(chunk, CAPACITY, max(1, -(-(last - first) // (4 * threads))))
-    starts = iter(range(first, last, size))
-    pending: deque[tuple[int, Future]] = deque()
+    """Sums of blocks first ... last - 1 in order, computed by threads that run ahead; ends early when stopped.
+
+    A call takes as many blocks as take about `SECONDS_OF_A_CALL`, so that a run stops soon after it is asked to.
+    """
+    most = min(chunk, CAPACITY, max(1, -(-(last - first) // (4 * threads))))
+    start, size = first, 1
+    pending: deque[tuple[int, int, Future]] = deque()
     with ThreadPoolExecutor(threads) as pool:
         while True:
-            while len(pending) < 2 * threads and not stopped() and (start := next(starts, None)) is not None:
-                pending.append((start, pool.submit(compiled.sums, start, min(size, last - start), runs)))
+            while len(pending) < 2 * threads and not stopped() and start < last:
+                count = min(size, last - start)
+                pending.append((start, count, pool.submit(_timed, compiled, start, count, runs)))
+                start += count
             if not pending:
                 return
-            start, future = pending.popleft()
-            yield start, future.result()
+            begin, count, future = pending.popleft()
+            sums, seconds = future.result()
+            size = max(1, min(most, int(count * SECONDS_OF_A_CALL / max(seconds, 1e-9))))
+            yield begin, sums
+
+
+def _timed(compiled: Compiled, start: int, count: int, runs: int) -> tuple[dict[str, Any], float]:
+    """Sums of blocks, and how long they took."""
+    begun = time.perf_counter()
+    return compiled.sums(start, count, runs), time.perf_counter() - begun

@@ -103,3 +103,15 @@ def test_killed_at_any_moment_and_resumed_gives_the_same_bytes(tmp_path, kills):
     straight, resumed = (next((tmp_path / name).rglob("DONE")).parent for name in ("straight", "killed"))
     assert table_bytes(straight) == table_bytes(resumed)
     assert not Results(resumed).damaged()
+
+
+def test_what_was_compiled_before_does_not_keep_a_run_from_its_cache(tmp_path):
+    """jax decides whether it has a cache when it first compiles anything."""
+    cache = tmp_path / "cache"
+    program = "import jax\njax.jit(lambda x: x + 1)(1.0)\n" + RUN
+    program = program.replace(
+        "import sys\n", f"import os, sys\nos.environ['NLBENCH_CACHE'] = {str(cache)!r}\n", 1
+    )
+    done = python(program, "64", str(tmp_path / "out"))
+    assert done.returncode == 0, done.stderr
+    assert list(cache.iterdir())
