@@ -63,6 +63,6 @@ def use_cache() -> None:
     folder = os.environ.get("NLBENCH_CACHE") or Path(base) / "nlbench" / "xla"
     if jax.config.jax_compilation_cache_dir != str(folder):  # type: ignore[attr-defined]
         jax.config.update("jax_compilation_cache_dir", str(folder))
-        compilation_cache.reset_cache()  # jax decides at its first compilation whether it has one
+        compilation_cache.reset_cache()  # jax stays with the folder of its first compilation
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)

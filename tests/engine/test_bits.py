@@ -106,12 +106,10 @@ def test_killed_at_any_moment_and_resumed_gives_the_same_bytes(tmp_path, kills):
 
 
 def test_what_was_compiled_before_does_not_keep_a_run_from_its_cache(tmp_path):
-    """jax decides whether it has a cache when it first compiles anything."""
+    """jax stays with the folder that it had when it first compiled anything."""
     cache = tmp_path / "cache"
-    program = "import jax\njax.jit(lambda x: x + 1)(1.0)\n" + RUN
-    program = program.replace(
-        "import sys\n", f"import os, sys\nos.environ['NLBENCH_CACHE'] = {str(cache)!r}\n", 1
-    )
-    done = python(program, "64", str(tmp_path / "out"))
+    first = f"import jax\njax.config.update('jax_compilation_cache_dir', {str(tmp_path / 'other')!r})\n"
+    first += f"jax.jit(lambda x: x + 1)(1.0)\nimport os\nos.environ['NLBENCH_CACHE'] = {str(cache)!r}\n"
+    done = python(first + RUN, "64", str(tmp_path / "out"))
     assert done.returncode == 0, done.stderr
     assert list(cache.iterdir())
