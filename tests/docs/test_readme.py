@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pytest
-
 from nlbench import config
 
 README = (Path(__file__).parents[2] / "README.md").read_text()
@@ -28,12 +26,15 @@ def test_python_blocks_run_one_after_the_other(tmp_path, monkeypatch, capsys):
     assert "rms" in printed
 
 
-@pytest.mark.parametrize("text", blocks("yaml"))
-def test_yaml_blocks_are_valid_experiments(tmp_path, text):
-    file = tmp_path / "experiment.yaml"
-    file.write_text(text)
-    experiment = config.load(file)
-    assert experiment.question.endswith("?")
+def test_yaml_blocks_are_valid_experiments_and_claims_belong_to_the_one_above(tmp_path):
+    file, text, claims = tmp_path / "experiment.yaml", "", 0
+    for block in blocks("yaml"):
+        text = text + block if block.startswith("claims:") else block
+        file.write_text(text)
+        experiment = config.load(file)
+        assert experiment.question.endswith("?")
+        claims = max(claims, len(experiment.claims))
+    assert claims == 4
 
 
 def test_the_data_block_goes_through_the_filters_of_the_file_above_it(tmp_path):
