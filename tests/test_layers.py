@@ -72,6 +72,7 @@ ALLOWED: dict[str, set[str]] = {
     "report": {"results", "figures", "errors"},
     "reproduce": {
         "config",
+        "statistics",
         "results",
         "figures",
         "report",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from nlbench.engine.compiled import Compiled
 from nlbench.engine.cost import cost_table
 from nlbench.engine.resume import device, numerics
-from nlbench.engine.trace import traced as traced_runs
+from nlbench.engine.trace import trace_tables
 from nlbench.results.atomic import remove
 from nlbench.results.folder import TABLES, RunFolder
 from nlbench.results.manifest import commit, versions
@@ -89,7 +89,7 @@ def write(
     norms = {name: [layout.coordinates[i] for i in members] for name, members in layout.norms.items()}
     made |= _judged(experiment, made, clip, norms)
     if experiment.traces:
-        made |= traced_runs(compiled, experiment.traces, threads)
+        made |= trace_tables(compiled, experiment.traces, threads)
     made["cost"] = cost_table(problem, experiment.monte_carlo.seed)
     _remove(folder, "traces", "responses", "claims", "sets")
     folder.write_tables(made)

@@ -12,12 +12,11 @@ import numpy as np
 
 from nlbench import filters, schedule, systems
 from nlbench.config.schema import PARTICLES
+from nlbench.engine.claims import check_claims
 from nlbench.errors import ConfigError
-from nlbench.errors import Problem as Mistake
 from nlbench.moments.moments import Moments
 from nlbench.simulate import path
 from nlbench.statistics.layout import Layout
-from nlbench.suggestions import suggestion
 from nlbench.systems.discrete import DiscreteSystem
 from nlbench.systems.exact import InitialPosterior
 from nlbench.systems.system import Coordinate, Sets, System, kind
@@ -78,30 +77,8 @@ def make(experiment: Experiment, own: System | DiscreteSystem | None = None) -> 
         makers.append(partial(_reference, experiment.reference, experiment.labels[-1], truth, times))
     runners = _all(makers)
     layout, block = _layout(experiment, stated), experiment.engine.block
-    _check_claims(experiment, layout)
+    check_claims(experiment.claims, layout)
     return Problem(truth, runners, times, layout, block, stated, _nominal_steps(truth, times))
-
-
-def _check_claims(experiment: Experiment, layout: Layout) -> None:
-    """Raises `ConfigError` for every claim about a coordinate or a moment that the system does not have."""
-    coordinates = (*layout.magnitudes, "all")
-    moments = [
-        ",".join(str(index + 1) for index in component)
-        for order in (2, 3)
-        for component in layout.components(order)
-    ]
-    problems = [
-        Mistake(f"claims.{claim.id}: the system has no {what} '{name}'{suggestion(name, names)}")
-        for claim in experiment.claims
-        for what, names, given in (
-            ("coordinate", coordinates, [claim.coordinate] if claim.coordinate else []),
-            ("moment", moments, claim.printed or []),
-        )
-        for name in given
-        if name not in names
-    ]
-    if problems:
-        raise ConfigError(problems)
 
 
 def _all(makers: list[Callable[[], Runner]]) -> tuple[Runner, ...]:

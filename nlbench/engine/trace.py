@@ -56,7 +56,7 @@ def replay(
     return pd.DataFrame(columns)
 
 
-def traced(compiled: Compiled, trajectories: Sequence[int], threads: int) -> dict[str, pd.DataFrame]:
+def trace_tables(compiled: Compiled, trajectories: Sequence[int], threads: int) -> dict[str, pd.DataFrame]:
     """The tables of single trajectories: `traces`, and `responses` where states have names that all filters share."""
     with ThreadPoolExecutor(threads) as pool:
         views = list(pool.map(compiled.view, trajectories))

@@ -6,12 +6,13 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from nlbench.statistics.claims import LEAST_RUNS
+from nlbench.statistics.uncertainty import NORMAL_975
+
 if TYPE_CHECKING:
     from nlbench.reproduce.summary import JudgedClaim
 
 Two = tuple[str, str]  # because, change
-NORMAL_975 = 1.959963984540054
-LEAST_RUNS = 30  # fewer decide nothing
 # Standard errors that a margin must measure to be decided: 3 for Holm's test of some twenty comparisons at 5 %, and .84
 # more so that four of five experiments of that size reach it.
 NEEDED = 3.84

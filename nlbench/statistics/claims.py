@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from nlbench.statistics.comparisons import Claim, Comparison, Tables, terms
+from nlbench.statistics.claim import Claim
+from nlbench.statistics.comparisons import Comparison, Tables, terms
 from nlbench.statistics.printed import against_moments
 from nlbench.statistics.sets import KeptTable, sets_table
 from nlbench.statistics.uncertainty import NORMAL_975, p_value

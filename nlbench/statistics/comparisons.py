@@ -18,54 +18,15 @@ of one filter may depend on each other in either direction: their standard error
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from nlbench.statistics.claim import Claim
 from nlbench.statistics.uncertainty import NORMAL_975, wilson
-
-
-@runtime_checkable
-class Claim(Protocol):
-    """What is needed of a claim of the experiment file (`nlbench.config.Claim`)."""
-
-    @property
-    def id(self) -> str: ...
-    @property
-    def says(self) -> str: ...
-    @property
-    def where(self) -> str | None: ...
-    @property
-    def whose(self) -> str: ...
-    @property
-    def figures(self) -> Sequence[str] | None: ...
-    @property
-    def form(self) -> str: ...
-    @property
-    def labels(self) -> Sequence[str]: ...
-    @property
-    def statistic(self) -> str: ...
-    @property
-    def coordinate(self) -> str | None: ...
-    @property
-    def at(self) -> Sequence[float]: ...
-    @property
-    def factor(self) -> float | None: ...
-    @property
-    def within(self) -> float | None: ...
-    @property
-    def below(self) -> float | None: ...
-    @property
-    def above(self) -> float | None: ...
-    @property
-    def agrees_with(self) -> str | None: ...
-    @property
-    def less_than(self) -> str | None: ...
-    @property
-    def printed(self) -> Mapping[str, float] | None: ...
 
 
 class Quantity(NamedTuple):

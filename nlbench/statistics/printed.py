@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from nlbench.statistics.comparisons import Claim, Comparison
+from nlbench.statistics.claim import Claim
+from nlbench.statistics.comparisons import Comparison
 from nlbench.statistics.sets import KeptTable
 from nlbench.statistics.uncertainty import p_value
 

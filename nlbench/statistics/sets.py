@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
-from nlbench.statistics.comparisons import Claim, Quantity, terms
+from nlbench.statistics.claim import Claim
+from nlbench.statistics.comparisons import Quantity, terms
 from nlbench.statistics.uncertainty import NORMAL_975, wilson
 
 SIZES = (10, 20, 80)  # the runs of a test in Culver 1969; Schwartz 1967 made ten
