@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections import deque
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from nlbench import runtime
 from nlbench.config.schema import SystemSpec
@@ -17,6 +15,7 @@ from nlbench.engine.finish import read_anew, traced, write
 from nlbench.engine.interruption import stop_requests
 from nlbench.engine.problem import make
 from nlbench.engine.resume import checkpoint, finished_runs, resumed, sound
+from nlbench.engine.workers import Threads, Workers, in_order
 from nlbench.errors import Interrupted
 from nlbench.results.folder import RunFolder
 from nlbench.results.results import Results
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 SECONDS_BETWEEN_CHECKPOINTS = 5.0
-SECONDS_OF_A_CALL = 1.0
 CHECKPOINT_SHARE = 30  # ... or more, so that writing large ones takes a thirtieth of the time
 
 
@@ -71,9 +69,9 @@ def _run(
         folder.write_experiment(experiment.resolved_yaml())
         runs = max(runs, totals.runs)
         threads = experiment.engine.threads or runtime.threads()
-        totals = _compute(
-            compiled, folder, totals, runs, threads, experiment.engine.chunk or CAPACITY, progress, stopped
-        )
+        chunk = experiment.engine.chunk or CAPACITY
+        with Threads(compiled, runs, threads) as workers:
+            totals = _compute(compiled, folder, totals, runs, workers, chunk, progress, stopped)
         seconds = time.perf_counter() - begun
         write(folder, experiment, compiled, totals, seconds, threads, bounds)
     return Results(folder.path)
@@ -89,7 +87,7 @@ def _compute(
     folder: RunFolder,
     totals: Totals,
     runs: int,
-    threads: int,
+    workers: Workers,
     chunk: int,
     progress: Progress,
     stopped: Callable[[], bool],
@@ -100,7 +98,7 @@ def _compute(
     saved, saved_at = totals.blocks, time.monotonic()
     progress(totals.runs, runs)
     pause = SECONDS_BETWEEN_CHECKPOINTS
-    for first, sums in _in_order(compiled, totals.blocks, whole, runs, threads, chunk, stopped):
+    for first, sums in in_order(workers, totals.blocks, whole, chunk, stopped):
         totals.add(first, sums)
         progress(totals.runs, runs)
         begun = time.monotonic()
@@ -119,39 +117,3 @@ def _compute(
         totals.add(whole, compiled.sums(whole, 1, runs))
         progress(runs, runs)
     return totals
-
-
-def _in_order(
-    compiled: Compiled,
-    first: int,
-    last: int,
-    runs: int,
-    threads: int,
-    chunk: int,
-    stopped: Callable[[], bool],
-) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Sums of blocks first ... last - 1 in order, computed by threads that run ahead; ends early when stopped.
-
-    A call takes as many blocks as take about `SECONDS_OF_A_CALL`, so that a run stops soon after it is asked to.
-    """
-    most = min(chunk, CAPACITY, max(1, -(-(last - first) // (4 * threads))))
-    start, size = first, 1
-    pending: deque[tuple[int, int, Future]] = deque()
-    with ThreadPoolExecutor(threads) as pool:
-        while True:
-            while len(pending) < 2 * threads and not stopped() and start < last:
-                count = min(size, last - start)
-                pending.append((start, count, pool.submit(_timed, compiled, start, count, runs)))
-                start += count
-            if not pending:
-                return
-            begin, count, future = pending.popleft()
-            sums, seconds = future.result()
-            size = max(1, min(most, int(count * SECONDS_OF_A_CALL / max(seconds, 1e-9))))
-            yield begin, sums
-
-
-def _timed(compiled: Compiled, start: int, count: int, runs: int) -> tuple[dict[str, Any], float]:
-    """Sums of blocks, and how long they took."""
-    begun = time.perf_counter()
-    return compiled.sums(start, count, runs), time.perf_counter() - begun

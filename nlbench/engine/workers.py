@@ -1,0 +1,82 @@
+"""Who computes blocks: calls that run at the same time, whose sums are taken in the order of the blocks."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
+
+from nlbench.engine.compiled import CAPACITY
+
+if TYPE_CHECKING:
+    from nlbench.engine.compiled import Compiled
+
+SECONDS_OF_A_CALL = 1.0
+
+
+class Part(NamedTuple):
+    """The sums of the blocks of one call, stacked along a leading axis, and the seconds that it took."""
+
+    sums: dict[str, Any]
+    seconds: float
+
+
+@runtime_checkable
+class Workers(Protocol):
+    """Several calls at a time; `at_once` says how many make all of them busy."""
+
+    at_once: int
+
+    def submit(self, first: int, count: int) -> Future[Part]:
+        """Begin to compute blocks first ... first + count - 1."""
+
+
+class Threads:
+    """Threads of this process, which call the same compiled program on different blocks."""
+
+    def __init__(self, compiled: Compiled, runs: int, threads: int):
+        self.at_once = threads
+        self._compiled, self._runs = compiled, runs
+        self._pool = ThreadPoolExecutor(threads)
+
+    def submit(self, first: int, count: int) -> Future[Part]:
+        return self._pool.submit(self._timed, first, count)
+
+    def _timed(self, first: int, count: int) -> Part:
+        begun = time.perf_counter()
+        sums = self._compiled.sums(first, count, self._runs)
+        return Part(sums, time.perf_counter() - begun)
+
+    def __enter__(self) -> Threads:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._pool.shutdown()
+
+
+def in_order(
+    workers: Workers, first: int, last: int, chunk: int, stopped: Callable[[], bool]
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Sums of blocks first ... last - 1 in order, computed by workers that run ahead; ends early when stopped.
+
+    A call takes as many blocks as take about `SECONDS_OF_A_CALL`, so that a run stops soon after it is asked to.
+    """
+    most = min(chunk, CAPACITY, max(1, -(-(last - first) // (4 * workers.at_once))))
+    start, size = first, 1
+    pending: deque[tuple[int, int, Future[Part]]] = deque()
+    while True:
+        while len(pending) < 2 * workers.at_once and not stopped() and start < last:
+            count = min(size, last - start)
+            pending.append((start, count, workers.submit(start, count)))
+            start += count
+        if not pending:
+            return
+        begin, count, future = pending.popleft()
+        sums, seconds = future.result()
+        size = max(1, min(most, int(count * SECONDS_OF_A_CALL / max(seconds, 1e-9))))
+        yield begin, sums
