@@ -41,7 +41,8 @@ def reproduce(
         bool,
         typer.Option(
             "--quick/--full",
-            help="At most 2,048 runs of each experiment (which full goes on from), or as many as its file says.",
+            help="At most 2,048 runs of each experiment, 320 where the reference is dear (full goes on from "
+            "them), or as many as its file says.",
         ),
     ] = False,
     out: options.Out = Path("results"),
@@ -89,6 +90,8 @@ class _Progress:
         what = "done before" if outcome.seconds is None else output.duration(outcome.seconds)
         if outcome.code:
             what = f"FAILED with exit code {outcome.code} after {what}"
+        elif outcome.fault:
+            what = f"{what}; {outcome.fault}"
         width = len(str(self.total))
         line = f"{self.count:{width}} of {self.total}  {job.name}, {job.runs:,} runs: {what}"
         print(line, file=sys.stderr, flush=True)

@@ -13,6 +13,7 @@ from nlbench.config.identity import canonical_hash, to_yaml
 LARGEST = 2**63 - 1
 # Sections that say how results are read and shown, not what is computed.
 READ = ("claims", "source", "figures", "traces")
+DECIDING = ("block", "precision")  # of the engine: what decides digits
 Figure = Literal[
     "rms",
     "rms_clipped",
@@ -159,6 +160,7 @@ class EngineSpec(Section):
     threads: int | None = Field(default=None, ge=1, le=4096, description="default: one for each core")
     block: int = Field(default=64, ge=1, le=65536, description="trajectories in a block")
     precision: Literal["float64", "float32"] = "float64"
+    cost: bool = Field(default=True, description="measure what each filter costs, compiled by itself")
 
 
 class Limits(Section):
@@ -223,5 +225,6 @@ class Experiment(Section):
     def hash12(self) -> str:
         """Identifies results that may be mixed: all counts but how many runs, how they are computed, and how read."""
         plain = self.resolved()
-        del plain["monte_carlo"]["runs"], plain["engine"]["chunk"], plain["engine"]["threads"]
+        del plain["monte_carlo"]["runs"]
+        plain["engine"] = {name: plain["engine"][name] for name in DECIDING}
         return canonical_hash({key: value for key, value in plain.items() if key not in READ})

@@ -11,7 +11,7 @@ from nlbench import runtime
 from nlbench.config.schema import SystemSpec
 from nlbench.engine.bounds import bounds_table
 from nlbench.engine.compiled import CAPACITY, Compiled, compile_chunks
-from nlbench.engine.finish import read_anew, traced, write
+from nlbench.engine.finish import complete, read_anew, write
 from nlbench.engine.interruption import stop_requests
 from nlbench.engine.problem import make
 from nlbench.engine.resume import checkpoint, finished_runs, resumed, sound
@@ -58,7 +58,7 @@ def _run(
     with folder.locked():
         done = finished_runs(folder)
         runs = max(experiment.monte_carlo.runs, done or 0)
-        if done == runs and sound(folder) and traced(folder, experiment):
+        if done == runs and sound(folder) and complete(folder, experiment):
             read_anew(folder, experiment)
             return Results(folder.path)
         begun = time.perf_counter()

@@ -28,9 +28,11 @@ if TYPE_CHECKING:
 OWN_FACTS = ("schema", "checksums", "runs")  # of a manifest: what writing it adds
 
 
-def traced(folder: RunFolder, experiment: Experiment) -> bool:
-    """Whether the traces of a finished run are those asked for, which may change without changing its hash."""
-    return Results(folder.path).experiment.traces == experiment.traces
+def complete(folder: RunFolder, experiment: Experiment) -> bool:
+    """Whether a finished run has what may be asked for without changing its hash: the same traces, and costs."""
+    results = Results(folder.path)
+    costed = "cost" in results.tables or not experiment.engine.cost
+    return costed and results.experiment.traces == experiment.traces
 
 
 def read_anew(folder: RunFolder, experiment: Experiment) -> None:
@@ -90,8 +92,9 @@ def write(
     made |= _judged(experiment, made, clip, norms)
     if experiment.traces:
         made |= trace_tables(compiled, experiment.traces, threads)
-    made["cost"] = cost_table(problem, experiment.monte_carlo.seed)
-    _remove(folder, "traces", "responses", "claims", "sets")
+    if experiment.engine.cost:
+        made["cost"] = cost_table(problem, experiment.monte_carlo.seed)
+    _remove(folder, "traces", "responses", "claims", "sets", "cost")
     folder.write_tables(made)
     folder.finish(
         totals.runs,

@@ -25,6 +25,7 @@ LONGEST_FAULT = 300
 class Outcome(NamedTuple):
     """How a job ended: the exit code of its process, what it complained of, how long this call spent on it.
 
+    A process that a signal killed when its results were complete has code 0, and the signal stands in `fault`.
     `seconds` is None where its results were there before.
     """
 
@@ -91,7 +92,8 @@ def done(job: Job) -> bool:
             return False
         saved = results.experiment
         same = {"monte_carlo": saved.monte_carlo, "engine": saved.engine}
-        return saved == job.experiment.model_copy(update=same) and not results.damaged()
+        costed = "cost" in results.tables or not job.experiment.engine.cost
+        return costed and saved == job.experiment.model_copy(update=same) and not results.damaged()
     except DamagedResults:
         return False
 
@@ -118,7 +120,11 @@ def _outcome(ended: _Running) -> Outcome:
     code = ended.process.returncode
     fault = " ".join(said.split())[-LONGEST_FAULT:] if code else ""
     if code < 0:
-        fault = f"killed by signal {-code} ({signal.Signals(-code).name}) {fault}".strip()
+        signalled = f"killed by signal {-code} ({signal.Signals(-code).name})"
+        if done(ended.job):  # libraries have aborted on their way out; results count, not the process
+            code, fault = 0, f"{signalled} after its results were written"
+        else:
+            fault = f"{signalled} {fault}".strip()
     return Outcome(ended.job, code, fault, time.monotonic() - ended.begun)
 
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from nlbench.reproduce.documents import Error, Item, Source
 
 QUICK_RUNS = 2048  # 32 blocks of 64: as many groups as the jackknife needs
+DEAR_RUNS = 320  # five blocks, where a reference on a grid takes tens of milliseconds a run
 
 
 class Chosen(NamedTuple):
@@ -80,8 +81,9 @@ def _is(item: Item, wanted: str) -> bool:
 def jobs(chosen: Chosen, configs: Path, out: Path, quick: bool = False) -> list[Job]:
     """The jobs of all that is chosen. Raises `ConfigError` with all that is wrong with the files.
 
-    quick: no experiment makes more than `QUICK_RUNS`, and only those figures are drawn that entries show, since drawing
-    the others takes longer than so few runs; otherwise as the files say.
+    quick: no experiment makes more than `QUICK_RUNS`, or `DEAR_RUNS` where the exact line is dear; costs are not
+    measured, and only those figures are drawn that entries show, since both take longer than so few runs. Otherwise
+    as the files say.
     """
     from nlbench.config import load
 
@@ -92,7 +94,7 @@ def jobs(chosen: Chosen, configs: Path, out: Path, quick: bool = False) -> list[
         )
     for name in chosen.experiments:
         file = configs / f"{name}.yaml"
-        settings = (f"figures=[{', '.join(chosen.figures(name))}]",) if quick else ()
+        settings = (f"figures=[{', '.join(chosen.figures(name))}]", "engine.cost=false") if quick else ()
         try:
             experiment = load(file, settings)
         except ConfigError as error:
@@ -100,7 +102,14 @@ def jobs(chosen: Chosen, configs: Path, out: Path, quick: bool = False) -> list[
             continue
         runs = experiment.monte_carlo.runs
         folder = out / experiment.experiment / experiment.hash12()
-        found.append(Job(name, file, settings, experiment, min(runs, QUICK_RUNS) if quick else runs, folder))
+        runs = min(runs, _quick_runs(experiment)) if quick else runs
+        found.append(Job(name, file, settings, experiment, runs, folder))
     if problems:
         raise ConfigError(problems)
     return found
+
+
+def _quick_runs(experiment: Experiment) -> int:
+    """How many runs are quick. Schwartz's exact line solves Zakai's equation on a grid in every run."""
+    dear = experiment.system.name == "schwartz" and experiment.reference == "exact"
+    return DEAR_RUNS if dear else QUICK_RUNS

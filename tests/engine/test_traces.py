@@ -77,6 +77,19 @@ def test_threads_do_not_change_a_byte_of_the_traces(done, tmp_path):
         assert (other.path / "tables" / name).read_bytes() == (done.path / "tables" / name).read_bytes()
 
 
+def test_a_finished_run_gains_costs_without_being_computed_again(tmp_path):
+    uncosted = experiment(system={"name": "culver-scalar"}, engine={"cost": False})
+    before = nb.run(uncosted, tmp_path)
+    assert "cost" not in before.tables
+    counts = []
+    costed = experiment(system={"name": "culver-scalar"})
+    after = nb.run(costed, tmp_path, progress=lambda runs, total: counts.append(runs))
+    assert after.path == before.path
+    assert counts[0] == 960  # the 15 whole blocks of the checkpoint
+    assert "cost" in after.tables
+    assert "cost" in nb.run(uncosted, tmp_path).tables  # not asked for, and there
+
+
 def test_a_finished_run_gains_and_loses_traces_without_being_computed_again(done, tmp_path):
     plain = experiment(system={"name": "culver-scalar"})
     before = nb.run(plain, tmp_path)

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -52,6 +53,30 @@ def test_a_quick_run_is_of_fewer_runs_and_draws_what_entries_show(tmp_path):
     assert [job.settings for job in full] == [(), ()]
     assert [job.experiment.figures for job in quick] == [["rms", "trace"], ["rms"]]
     assert [job.folder for job in quick] == [job.folder for job in full]
+    assert [job.experiment.engine.cost for job in quick] == [False, False]
+
+
+def test_a_quick_run_with_a_dear_reference_is_of_fewer_runs_still():
+    exact, without = (
+        SimpleNamespace(name=name, experiments=(name,), pictures=())
+        for name in ("schwartz/d1-m11", "schwartz/response-d1-m11")
+    )
+    chosen = jobs.Chosen(((None, (exact, without)),), ())
+    quick = jobs.jobs(chosen, Path("configs"), Path("out"), quick=True)
+    assert quick[0].experiment.reference == "exact"
+    assert quick[1].experiment.reference is None
+    assert [job.runs for job in quick] == [320, quick[1].experiment.monte_carlo.runs]
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_results_count_and_not_how_the_process_died(two, tmp_path, monkeypatch, finished):
+    monkeypatch.setattr(driver, "done", lambda job: finished)
+    process = subprocess.Popen([sys.executable, "-c", "import os; os.abort()"])
+    process.wait()
+    ended = driver._outcome(driver._Running(two[0], process, (tmp_path / "said").open("w+b"), 0.0))
+    assert ended.code == (0 if finished else -signal.SIGABRT)
+    assert ended.fault.startswith("killed by signal 6 (SIGABRT)")
+    assert ("after its results were written" in ended.fault) is finished
 
 
 def test_settings_reach_the_run(tmp_path):
@@ -82,10 +107,13 @@ def test_the_longest_begins_first(two, tmp_path, monkeypatch):
 def test_a_run_is_done_when_its_results_are_sound_read_alike_and_of_as_many_runs(tmp_path):
     results = synthetic_run.results(tmp_path / "run", runs=500)
     (results.path / "report.html").write_text("")
-    job = jobs.Job("tests/synthetic", tmp_path / "file.yaml", (), results.experiment, 500, results.path)
+    saved = results.experiment
+    uncosted = saved.model_copy(update={"engine": saved.engine.model_copy(update={"cost": False})})
+    job = jobs.Job("tests/synthetic", tmp_path / "file.yaml", (), uncosted, 500, results.path)
     assert driver.done(job)
+    assert not driver.done(job._replace(experiment=saved))
     assert not driver.done(job._replace(runs=501))
-    other = results.experiment.model_copy(update={"traces": [0]})
+    other = uncosted.model_copy(update={"traces": [0]})
     assert not driver.done(job._replace(experiment=other))
     (results.path / "tables" / "paired.csv").write_text("edited")
     assert not driver.done(job)
