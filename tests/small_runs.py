@@ -15,7 +15,7 @@ STABLE = ("statistics", "moments", "paired", "divergence", "consistency", "runs"
 
 
 def experiment(**changes: Any) -> config.Experiment:
-    """A short scalar experiment with the reference; `changes` replace top-level keys."""
+    """A short scalar experiment with the reference, without costs; `changes` replace top-level keys."""
     plain: dict[str, Any] = {
         "experiment": "small",
         "system": {"name": "culver-scalar", "ensemble": "normal"},
@@ -25,7 +25,8 @@ def experiment(**changes: Any) -> config.Experiment:
         "report_times": [0.2, 0.6],
         "monte_carlo": {"runs": 1000, "seed": 11},
     }
-    return config.from_dict({**plain, **changes})
+    engine = {"cost": False, **changes.pop("engine", {})}
+    return config.from_dict({**plain, **changes, "engine": engine})
 
 
 def table_bytes(folder: Path) -> dict[str, bytes]:

@@ -38,6 +38,7 @@ def run(out, filters, system=SYSTEM, **more):
                 "time": {"end": END, "step": STEP, "output": 0.1},
                 "report_times": [0.1, 0.2],
                 "monte_carlo": {"runs": 3, "seed": SEED},
+                "engine": {"cost": False},
                 **more,
             }
         ),

@@ -102,6 +102,7 @@ def test_filters_of_a_run_may_see_samples_or_all_of_the_same_measurements(tmp_pa
                 "filters": entries,
                 "time": {"end": 0.2, "step": H, "output": 0.1},
                 "monte_carlo": {"runs": 2, "seed": 3},
+                "engine": {"cost": False},
             }
         ),
         tmp_path,
@@ -121,6 +122,7 @@ def test_filters_of_a_run_may_see_samples_or_all_of_the_same_measurements(tmp_pa
                 "filters": ["schwartz-2"],
                 "time": {"end": 0.2, "step": H, "output": 0.1},
                 "monte_carlo": {"runs": 2, "seed": 3},
+                "engine": {"cost": False},
             }
         ),
         tmp_path,

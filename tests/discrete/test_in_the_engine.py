@@ -19,6 +19,7 @@ def test_errors_of_sampling_are_independent_from_run_to_run(name, tmp_path):
             "filters": [{"name": name, "particles": 50}, "linearised-kalman"],
             "time": {"end": 0.4, "step": 0.02, "output": 0.1},
             "monte_carlo": {"runs": 200, "seed": 4},
+            "engine": {"cost": False},
         },
         tmp_path,
     )

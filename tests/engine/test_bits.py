@@ -75,7 +75,7 @@ def test_block_and_precision_make_another_experiment():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kills", [8, pytest.param(60, marks=pytest.mark.long)])
+@pytest.mark.parametrize("kills", [3, pytest.param(60, marks=pytest.mark.long)])
 def test_killed_at_any_moment_and_resumed_gives_the_same_bytes(tmp_path, kills):
     """Killed up to so many times, at the first checkpoint after each start or up to 0.09 s later."""
     program = RUN.replace("import sys\n", "import sys\nimport nlbench.engine.driver as driver\n", 1)

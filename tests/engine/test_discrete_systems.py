@@ -60,6 +60,7 @@ def stated(system, **changes):
         "filters": ["ekf"],
         "time": {"end": 12, "output": 2},
         "monte_carlo": {"runs": 200, "seed": 3},
+        "engine": {"cost": False},
     }
     return {**plain, **changes, "system": system}
 
@@ -273,7 +274,7 @@ def test_plan_counts_steps_and_measurements():
 
 
 def test_traces_and_costs_are_saved(tmp_path):
-    results = run(linear(), tmp_path, filters=["ekf", "ukf"], traces=[7])
+    results = run(linear(), tmp_path, filters=["ekf", "ukf"], traces=[7], engine={"cost": True})
     traced, cost = results.table("traces"), results.table("cost")
     single = engine.replay(stated(linear(), filters=["ekf", "ukf"]), "ukf", 7)
     mine = traced[(traced["filter"] == "ukf") & (traced.coordinate == "x2")]

@@ -29,6 +29,7 @@ def run(system, out, **changes):
         "filters": ["ekf", "second-order"],
         "time": {"end": 1.0, "step": 0.05, "output": 0.2},
         "monte_carlo": {"runs": 500},
+        "engine": {"cost": False},
         **changes,
     }
     return nb.run({**stated, "system": system}, out)

@@ -52,6 +52,7 @@ def test_agrees_with_an_independent_implementation(group, tmp_path):
                 "time": {"end": 2.0, "step": 0.02, "output": 0.1},
                 "report_times": report_times(values),
                 "monte_carlo": {"runs": 20_000, "seed": 20},
+                "engine": {"cost": False},
             }
         ),
         tmp_path,

@@ -23,6 +23,7 @@ OSCILLATOR = {
     "time": {"end": 1.2, "step": 0.05, "output": 0.4},
     "report_times": [1.2],
     "monte_carlo": {"runs": 64, "seed": 5},
+    "engine": {"cost": False},
 }
 
 
@@ -159,6 +160,7 @@ def test_continuous_measurements_are_scored_step_by_step(tmp_path):
             "filters": ["kushner-2"],
             "time": {"end": 1.0, "step": 0.01, "output": 0.5},
             "monte_carlo": {"runs": 1000, "seed": 4},
+            "engine": {"cost": False},
         },
         tmp_path,
     )

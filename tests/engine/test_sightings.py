@@ -52,6 +52,7 @@ def stated(system, **changes):
         "time": {"end": END, "step": STEP, "output": 1.0},
         "report_times": [8.0, END],
         "monte_carlo": {"runs": 100, "seed": SEED},
+        "engine": {"cost": False},
         **changes,
     }
 

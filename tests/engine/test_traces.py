@@ -78,11 +78,11 @@ def test_threads_do_not_change_a_byte_of_the_traces(done, tmp_path):
 
 
 def test_a_finished_run_gains_costs_without_being_computed_again(tmp_path):
-    uncosted = experiment(system={"name": "culver-scalar"}, engine={"cost": False})
+    uncosted = experiment(system={"name": "culver-scalar"})
     before = nb.run(uncosted, tmp_path)
     assert "cost" not in before.tables
     counts = []
-    costed = experiment(system={"name": "culver-scalar"})
+    costed = experiment(system={"name": "culver-scalar"}, engine={"cost": True})
     after = nb.run(costed, tmp_path, progress=lambda runs, total: counts.append(runs))
     assert after.path == before.path
     assert counts[0] == 960  # the 15 whole blocks of the checkpoint

@@ -116,6 +116,7 @@ def test_in_a_run_its_error_is_the_state_less_the_initial_mean(measurement, tmp_
                 "filters": [{"name": "no-filter", "label": "no filter"}],
                 "time": {"end": 0.2, "step": 0.02, "output": 0.1},
                 "monte_carlo": {"runs": 3, "seed": 4},
+                "engine": {"cost": False},
             }
         ),
         tmp_path,

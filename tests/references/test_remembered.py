@@ -99,6 +99,7 @@ def test_in_the_engine_it_is_the_linear_filter(tmp_path):
             "reference": "exact",
             "time": {"end": 2.0, "step": 0.01, "output": 0.1},
             "monte_carlo": {"runs": 100, "seed": 2},
+            "engine": {"cost": False},
         },
         tmp_path,
     )
@@ -122,6 +123,7 @@ def test_on_the_lunar_orbit_its_errors_are_what_it_says_they_are(tmp_path):
             "reference": "exact",
             "time": {"end": 18_000, "step": 50, "output": 3_000},
             "monte_carlo": {"runs": 320, "seed": 8},
+            "engine": {"cost": False},
         },
         tmp_path,
     )

@@ -13,6 +13,7 @@ system: {{name: culver-scalar, interval: 0.1}}
 filters: {filters}
 time: {{end: 0.4, step: 0.02, output: 0.2}}
 monte_carlo: {{runs: 100, seed: 7}}
+engine: {{cost: false}}
 """
 
 

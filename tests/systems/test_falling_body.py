@@ -104,6 +104,7 @@ def test_second_order_removes_the_bias_where_the_drag_is_greatest(tmp_path):
             "time": {"end": 16.0, "step": 0.01, "output": 1.0},
             "report_times": [16.0],
             "monte_carlo": {"runs": runs, "seed": 6},
+            "engine": {"cost": False},
         },
         tmp_path,
     )
