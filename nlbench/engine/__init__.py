@@ -21,11 +21,11 @@ def run(experiment: Any, out: Any = None, progress: Any = None) -> Any:
     return run(*_stated(experiment), "results" if out is None else out, progress)
 
 
-def plan(experiment: Any) -> dict[str, Any]:
-    """What a run would cost: blocks, steps, seconds, bytes of memory and of disk."""
-    from nlbench.engine.estimate import plan
+def plan(experiment: Any, out: Any = None) -> dict[str, Any]:
+    """What `run` with the same `out` would cost: counts; seconds and bytes of memory and of disk, each by part."""
+    from nlbench.engine.planning.plan import plan
 
-    return plan(*_stated(experiment))
+    return plan(*_stated(experiment), "results" if out is None else out)
 
 
 def replay(experiment: Any, label: str, trajectory: int) -> Any:

@@ -39,6 +39,11 @@ class KeptRuns:
         self.count += fit
 
     @property
+    def capacity(self) -> int:
+        """How many runs there is room for."""
+        return self._room.lost.shape[-1]
+
+    @property
     def runs(self) -> Reported:
         """All that is kept."""
         return Reported(*(part[..., : self.count] for part in self._room))
