@@ -9,6 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from nlbench.config import Experiment
+    from nlbench.config.precision import Precision as PrecisionAsked
 
 Config = Annotated[Path, typer.Argument(metavar="CONFIG", help="Experiment file (YAML).", show_default=False)]
 Runs = Annotated[
@@ -23,6 +24,12 @@ Set = Annotated[
     ),
 ]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of all results.")]
+Precision = Annotated[
+    str | None,
+    typer.Option(
+        "--precision", metavar="WHAT:P%", help="Choose the runs: rms:1% is a standard error of 1 % of each."
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 
 
@@ -36,6 +43,16 @@ def experiment(config: Path, runs: str | None, seed: str | None, settings: list[
     if seed is not None:
         overrides.append(Override("monte_carlo.seed", seed, "--seed"))
     return load(config, overrides)
+
+
+def precision(text: str | None, runs: str | None) -> PrecisionAsked | None:
+    """The precision asked for. Raises `ConfigError` for a bad one, and where --runs is given as well."""
+    from nlbench.config.precision import parse
+    from nlbench.errors import ConfigError
+
+    if text is not None and runs is not None:
+        raise ConfigError("--precision chooses the number of runs, --runs gives it: leave one out")
+    return None if text is None else parse(text)
 
 
 def folder(experiment: Experiment, out: Path) -> Path:

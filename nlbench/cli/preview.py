@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
 
-from nlbench.cli import options, output
+from nlbench.cli import options, output, planned
 from nlbench.errors import ConfigError, EnvironmentFault
 
 
@@ -48,37 +48,28 @@ def plan(
     runs: options.Runs = None,
     seed: options.Seed = None,
     settings: options.Set = None,
+    out: options.Out = Path("results"),
+    precision: options.Precision = None,
     json: options.Json = False,
 ) -> None:
-    """Say what a run costs: time, memory, disk."""
+    """Say what a run costs, or what is left of it: time, memory, disk."""
+    asked = options.precision(precision, runs)
     experiment = options.experiment(config, runs, seed, settings)
     from nlbench import runtime
 
     runtime.configure(precision=experiment.engine.precision, threads=experiment.engine.threads)
     from nlbench import engine
 
-    cost = engine.plan(experiment)
+    cost = engine.plan(experiment, out, None if asked is None else str(asked))
     if json:
         output.as_json(cost)
         return
-    print(f"{experiment.experiment}, {experiment.monte_carlo.runs:,} runs")
-    output.definitions((_title(name), _amount(name, value)) for name, value in cost.items())
-    options_given = [word for pair in (("--runs", runs), ("--seed", seed)) if pair[1] for word in pair]
-    output.next_step(options.command("run", config, settings, *map(str, options_given)), "runs it")
-
-
-def _title(name: str) -> str:
-    return name.replace("_seconds", "_time").removesuffix("_bytes").replace("_", " ")
-
-
-def _amount(name: str, value: Any) -> str:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
-    if "second" in name or name == "time":
-        return output.duration(value)
-    if any(word in name for word in ("memory", "disk", "bytes")):
-        return output.size(value)
-    return f"{value:,}" if isinstance(value, int) else f"{value:,.3g}"
+    planned.show(experiment, cost)
+    given = {"--runs": runs, "--precision": precision, "--seed": seed}
+    words = [str(word) for pair in given.items() if pair[1] for word in pair]
+    if out != Path("results"):
+        words += ["--out", str(out)]
+    output.next_step(options.command("run", config, settings, *words), "runs it")
 
 
 def doctor(json: options.Json = False) -> None:

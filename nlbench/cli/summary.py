@@ -11,6 +11,7 @@ from nlbench.errors import GateError, LimitError, NlbenchError
 
 if TYPE_CHECKING:
     from nlbench.config import Experiment
+    from nlbench.config.precision import Precision
 
 VERDICT_STYLES = {"confirmed": "green", "refuted": "red"}
 
@@ -33,6 +34,14 @@ def facts(experiment: Experiment, results: Any, report: Path) -> dict[str, Any]:
         "divergence": _records(results.table("divergence")),
         "claims": _records(results.table("claims")) if experiment.claims else [],
     }
+
+
+def precision(asked: Precision, chosen: Any, experiment: Experiment, results: Any) -> dict[str, Any]:
+    """What precision was asked for, the runs chosen, and the largest standard error that they gave, as a share."""
+    from nlbench.engine.planning.precision import reached
+
+    share = reached(asked, results.table("statistics"), experiment.report_times)
+    return {"asked": str(asked), **chosen._asdict(), "reached": share}
 
 
 def failed(facts: dict[str, Any]) -> list[str]:
@@ -80,9 +89,17 @@ def show(experiment: Experiment, facts: dict[str, Any]) -> None:
         for row in facts["claims"]:
             verdict = output.styled(row["verdict"].ljust(9), VERDICT_STYLES.get(row["verdict"], "yellow"))
             print(f"  {row['id']}  {verdict}  {says.get(row['id'], row['says'])}")
+    if "precision" in facts:
+        print(f"\nprecision  {_reached(facts['precision'])}")
     print("\nfiles")
     written = [("report", facts["report"]), ("tables", f"{facts['folder']}/tables")]
     output.rows([*written, ("figures", f"{facts['folder']}/figures ({len(facts['figures'])})")])
+
+
+def _reached(found: dict[str, Any]) -> str:
+    """Asked and reached; the runs were chosen from a pilot, so that it can be missed by a little."""
+    left_out = f"; without a usable value: {', '.join(found['left_out'])}" if found["left_out"] else ""
+    return f"asked {found['asked']}, reached {output.percent(found['reached'])} % at worst{left_out}"
 
 
 def _rms(experiment: Experiment, rows: list[dict[str, Any]], coordinate: str, lost: list[str]) -> None:

@@ -7,25 +7,31 @@ from typing import Any
 __all__ = ["plan", "replay", "run"]
 
 
-def run(experiment: Any, out: Any = None, progress: Any = None) -> Any:
+def run(experiment: Any, out: Any = None, progress: Any = None, check: Any = None) -> Any:
     """Run an experiment, or go on with one that was stopped, and return its `Results`.
 
     experiment: an `Experiment`, a path of an experiment file, or a dict with the keys of one, whose `system` may be a
         `System` or `DiscreteSystem` of your own.
-    out: folder of results (default "results"). progress: called with (runs done, runs in all).
+    out: folder of results (default "results"). progress: called with (runs done, runs in all). check: called before
+        anything is computed, and may raise (`nlbench.engine.planning.space.require` where room is short).
     Raises `ConfigError` before anything is computed, `LockedError` where another process runs the same experiment,
     `EnvironmentFault` for disk and memory, `Interrupted` after Ctrl-C with everything so far saved.
     """
     from nlbench.engine.driver import run
 
-    return run(*_stated(experiment), "results" if out is None else out, progress)
+    return run(*_stated(experiment), "results" if out is None else out, progress, check)
 
 
-def plan(experiment: Any, out: Any = None) -> dict[str, Any]:
-    """What `run` with the same `out` would cost: counts; seconds and bytes of memory and of disk, each by part."""
+def plan(experiment: Any, out: Any = None, precision: str | None = None) -> dict[str, Any]:
+    """What `run` with the same `out` would cost: counts; seconds and bytes of memory and of disk, each by part.
+
+    precision: such as "rms:1%", which then chooses the runs.
+    """
+    from nlbench.config.precision import parse
     from nlbench.engine.planning.plan import plan
 
-    return plan(*_stated(experiment), "results" if out is None else out)
+    asked = None if precision is None else parse(precision, "precision")
+    return plan(*_stated(experiment), "results" if out is None else out, asked)
 
 
 def replay(experiment: Any, label: str, trajectory: int) -> Any:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from nlbench.systems.system import System
 
 Progress = Callable[[int, int], None]
+Check = Callable[[Compiled, Totals, int, int, Path], None]  # program, totals, runs, threads, folder
 SECONDS_BETWEEN_CHECKPOINTS = 5.0
 CHECKPOINT_SHARE = 30  # ... or more, so that writing large ones takes a thirtieth of the time
 
@@ -36,10 +37,11 @@ def run(
     own: System | DiscreteSystem | None,
     out: str | Path,
     progress: Progress | None = None,
+    check: Check | None = None,
 ) -> Results:
-    """Compute what is missing of an experiment and write its results."""
+    """Compute what is missing of an experiment and write its results. `check` may raise before anything is computed."""
     with stop_requests() as stopped:
-        return _run(experiment, own, Path(out), progress or (lambda done, total: None), stopped)
+        return _run(experiment, own, Path(out), progress or (lambda done, total: None), stopped, check)
 
 
 def _run(
@@ -48,6 +50,7 @@ def _run(
     out: Path,
     progress: Progress,
     stopped: Callable[[], bool],
+    check: Check | None,
 ) -> Results:
     problem = make(experiment, own)
     compiled = None
@@ -65,13 +68,15 @@ def _run(
         bounds = bounds_table(problem, experiment.monte_carlo.seed) if experiment.bounds else None
         compiled = compiled or compile_chunks(problem, experiment.monte_carlo.seed)
         totals = resumed(folder, compiled)
-        folder.reopen()
-        folder.write_experiment(experiment.resolved_yaml())
         runs = max(runs, totals.runs)
         threads = experiment.engine.threads or runtime.threads()
+        if check is not None:
+            check(compiled, totals, runs, threads, folder.path)
+        folder.reopen()
+        folder.write_experiment(experiment.resolved_yaml())
         chunk = experiment.engine.chunk or CAPACITY
         with Threads(compiled, runs, threads) as workers:
-            totals = _compute(compiled, folder, totals, runs, workers, chunk, progress, stopped)
+            totals = compute(compiled, folder, totals, runs, workers, chunk, progress, stopped)
         seconds = time.perf_counter() - begun
         write(folder, experiment, compiled, totals, seconds, threads, bounds)
     return Results(folder.path)
@@ -82,7 +87,7 @@ def _identified(experiment: Experiment, program: str) -> Experiment:
     return experiment.model_copy(update={"system": SystemSpec(name="own", parameters=parameters)})
 
 
-def _compute(
+def compute(
     compiled: Compiled,
     folder: RunFolder,
     totals: Totals,

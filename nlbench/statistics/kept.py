@@ -44,6 +44,10 @@ class KeptRuns:
         return self._room.lost.shape[-1]
 
     @property
+    def bytes_of_a_run(self) -> int:
+        return sum(part.nbytes for part in self._room) // max(1, self.capacity)
+
+    @property
     def runs(self) -> Reported:
         """All that is kept."""
         return Reported(*(part[..., : self.count] for part in self._room))

@@ -44,6 +44,12 @@ def calibrate(compiled: Compiled, threads: int) -> Calibration:
         count = max(count + 1, int(count * min(MOST_GROWTH, growth)))
 
 
+def extend(compiled: Compiled, totals: Totals, blocks: int, threads: int) -> None:
+    """Compute what the totals lack of so many blocks."""
+    if totals.blocks < blocks:
+        _pass(compiled, totals, blocks - totals.blocks, threads)
+
+
 def _pass(compiled: Compiled, totals: Totals, count: int, threads: int) -> None:
     first = totals.blocks
     last = first + count

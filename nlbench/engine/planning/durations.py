@@ -24,7 +24,7 @@ ALONE = 0.75
 
 
 class Work(NamedTuple):
-    """What is to be done: blocks; values kept, one for each run, filter and report time; bytes of a checkpoint; pictures;
+    """What is to be done: blocks; values kept, each of a run, filter and report time; bytes of a checkpoint; pictures;
     claims; and whether the tables are there already."""
 
     blocks: int

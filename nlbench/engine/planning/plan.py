@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from nlbench import runtime
 from nlbench.engine.bounds import bounds_table
 from nlbench.engine.compiled import compile_chunks
 from nlbench.engine.planning import machine, sizes
-from nlbench.engine.planning.calibration import calibrate
+from nlbench.engine.planning.calibration import calibrate, extend
 from nlbench.engine.planning.compilation import listening
 from nlbench.engine.planning.durations import Measured, Work, durations
 from nlbench.engine.planning.memory import memory
+from nlbench.engine.planning.precision import Chosen, needed, pilot_runs
 from nlbench.engine.problem import make
 from nlbench.engine.resume import finished_runs, resumed
 from nlbench.results.folder import RunFolder
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from nlbench.config import Experiment
+    from nlbench.config.precision import Precision
     from nlbench.engine.compiled import Compiled
     from nlbench.engine.problem import Problem
     from nlbench.schedule import Schedule
@@ -31,13 +34,24 @@ if TYPE_CHECKING:
     from nlbench.systems.discrete import DiscreteSystem
     from nlbench.systems.system import System
 
-
 T = TypeVar("T")
 Amount = TypeVar("Amount", int, float)
 
 
+class Left(NamedTuple):
+    """How many runs there will be in all, how many are there, whether their tables are, and blocks to compute."""
+
+    runs: int
+    done: int
+    finished: bool
+    blocks: int
+
+
 def plan(
-    experiment: Experiment, own: System | DiscreteSystem | None = None, out: str | Path = "results"
+    experiment: Experiment,
+    own: System | DiscreteSystem | None = None,
+    out: str | Path = "results",
+    precision: Precision | None = None,
 ) -> dict[str, Any]:
     """Counts; seconds, bytes of memory and bytes of disk by part, the last entry of each their sum.
 
@@ -48,40 +62,32 @@ def plan(
     before = machine.resident()
     with listening() as heard:
         compiled, seconds = _timed(lambda: compile_chunks(problem, experiment.monte_carlo.seed))
-    grown = machine.resident() - before
-    folder = RunFolder(Path(out) / experiment.experiment / experiment.hash12()) if own is None else None
-    runs, done, saved = _done(experiment, folder, compiled)
-    threads = experiment.engine.threads or runtime.threads()
     held = machine.resident()
+    threads = experiment.engine.threads or runtime.threads()
+    folder = RunFolder(Path(out) / experiment.experiment / experiment.hash12()) if own is None else None
+    saved = resumed(folder, compiled) if folder and folder.path.is_dir() else None
     calibration = calibrate(compiled, threads)
+    chosen = _chosen(precision, compiled, saved, calibration.totals, threads) if precision else None
+    asked = chosen.runs if chosen else experiment.monte_carlo.runs
+    left = _left(asked, problem.block, saved, folder)
     bounds = (
         _timed(lambda: bounds_table(problem, experiment.monte_carlo.seed))[1] if experiment.bounds else 0.0
     )
-    sample, tabled = _timed(lambda: _written(problem, calibration.totals))
-    kept = min(runs, problem.layout.keep_runs)
-    values = kept * len(problem.layout.filters) * len(problem.layout.reports)
-    state = sizes.state(calibration.totals, runs)
-    diverged = bool((calibration.totals.groups["first_lost"] > 0).any())
-    pictures = sizes.pictures(experiment, problem.layout, diverged)
-    blocks = 0 if done == runs else max(0, -(-runs // problem.block) - (saved.blocks if saved else 0))
-    work = Work(blocks, values, state, pictures, len(experiment.claims), done == runs)
+    files, tabled = _timed(lambda: _files(experiment, problem, calibration.totals, left.runs))
+    pictures = _pictures(experiment, problem, calibration.totals)
+    values = min(left.runs, problem.layout.keep_runs) * len(experiment.labels) * len(problem.layout.reports)
+    work = Work(left.blocks, values, files["checkpoint"], pictures, len(experiment.claims), left.finished)
     measured = Measured(stated, bounds, tabled, machine.slowness(), heard.compilation(seconds), calibration)
-    disk = _disk(sample, calibration.totals, kept, state) | {
-        "figures_and_report": sizes.drawn(pictures, problem.layout)
-    }
-    steps = problem.schedule.segments * problem.schedule.segment_steps
+    needs = memory(compiled, problem, files["checkpoint"], values, threads, held, held - before)
     return {
-        "filters": list(experiment.labels),
-        "runs": runs,
-        "runs_done": done if done == runs else saved.runs if saved else 0,
-        "steps_per_run": steps,
-        "filter_steps": len(experiment.labels) * runs * steps,
-        **_measurements(problem.schedule),
-        "blocks": blocks,
+        **_counts(experiment, problem, left),
         "threads": threads,
+        **({"precision": {"asked": str(precision), **chosen._asdict()}} if chosen else {}),
         "seconds": _summed(durations(problem, work, measured, threads)),
-        "memory_bytes": _summed(memory(compiled, problem, state, values, threads, held, grown)),
-        "disk_bytes": _summed(disk),
+        "memory_bytes": _summed(needs),
+        "memory_free_bytes": machine.free_memory(),
+        "disk_bytes": _summed(files),
+        "disk_free_bytes": machine.free_disk(Path(out)),
     }
 
 
@@ -91,38 +97,38 @@ def _timed(made: Callable[[], T]) -> tuple[T, float]:
     return result, time.perf_counter() - begun
 
 
-def _done(
-    experiment: Experiment, folder: RunFolder | None, compiled: Compiled
-) -> tuple[int, int | None, Totals | None]:
-    """How many runs there will be, how many are finished, and the totals of a checkpoint."""
-    asked = experiment.monte_carlo.runs
-    if folder is None or not folder.path.is_dir():
-        return asked, None, None
-    done, saved = finished_runs(folder), resumed(folder, compiled)
-    return max(asked, done or 0, saved.runs), done, saved
+def _chosen(
+    precision: Precision, compiled: Compiled, saved: Totals | None, totals: Totals, threads: int
+) -> Chosen:
+    """The runs that a precision needs; `totals` are extended to the pilot where `saved` do not hold it."""
+    block, pilot = compiled.problem.block, pilot_runs(compiled.problem.layout)
+    if saved is not None and saved.kept.count >= pilot:
+        return needed(precision, saved, block)
+    extend(compiled, totals, math.ceil(pilot / block), threads)
+    return needed(precision, totals, block)
 
 
-def _written(problem: Problem, totals: Totals) -> dict[str, int]:
-    """Bytes of the tables that these totals make."""
-    made = tables(totals)
-    made["consistency"] = consistency_table(totals, made["statistics"], problem.truth.measurements)
-    return sizes.written(made)
+def _left(asked: int, block: int, saved: Totals | None, folder: RunFolder | None) -> Left:
+    finished = finished_runs(folder) if folder else None
+    there = saved.runs if saved else 0
+    runs = max(asked, finished or 0, there)
+    if finished == runs:
+        return Left(runs, runs, True, 0)
+    return Left(runs, there, False, math.ceil(runs / block) - (saved.blocks if saved else 0))
 
 
-def _disk(sample: dict[str, int], totals: Totals, kept: int, state: int) -> dict[str, int]:
-    """Bytes of the files with numbers; a checkpoint is there twice while it is replaced."""
-    in_sample = min(totals.kept.count, totals.layout.keep_runs)
-    rows = sample.pop(sizes.KEPT) * kept // in_sample if in_sample else 0
+def _counts(experiment: Experiment, problem: Problem, left: Left) -> dict[str, Any]:
+    steps = problem.schedule.segments * problem.schedule.segment_steps
     return {
-        "checkpoint": state,
-        "checkpoint_replaced": state,
-        "tables": sum(sample.values()),
-        "kept_runs": rows,
+        "filters": list(experiment.labels),
+        "runs": left.runs,
+        "runs_done": left.done,
+        "steps_per_run": steps,
+        "filter_steps": len(experiment.labels) * left.runs * steps,
+        **_measurements(problem.schedule),
+        "blocks": math.ceil(left.runs / problem.block),
+        "blocks_left": left.blocks,
     }
-
-
-def _summed(parts: dict[str, Amount]) -> dict[str, Amount]:
-    return {**parts, "total": sum(parts.values())}
 
 
 def _measurements(schedule: Schedule) -> dict[str, int]:
@@ -130,3 +136,27 @@ def _measurements(schedule: Schedule) -> dict[str, int]:
     if schedule.sightings:
         return {"most_sightings_per_run": schedule.sightings}
     return {"measurements_per_run": schedule.measurements}
+
+
+def _files(experiment: Experiment, problem: Problem, totals: Totals, runs: int) -> dict[str, int]:
+    """Bytes of what is written, from the tables of some runs; a checkpoint is there twice while it is replaced."""
+    made = tables(totals)
+    made["consistency"] = consistency_table(totals, made["statistics"], problem.truth.measurements)
+    written = sizes.written(made)
+    of_kept, rows = written.pop(sizes.KEPT), min(totals.kept.count, problem.layout.keep_runs)
+    state = sizes.state(totals, runs)
+    return {
+        "checkpoint": state,
+        "checkpoint_replaced": state,
+        "tables": sum(written.values()),
+        "kept_runs": of_kept * min(runs, problem.layout.keep_runs) // rows if rows else 0,
+        "figures_and_report": sizes.drawn(_pictures(experiment, problem, totals), problem.layout),
+    }
+
+
+def _pictures(experiment: Experiment, problem: Problem, totals: Totals) -> int:
+    return sizes.pictures(experiment, problem.layout, bool((totals.groups["first_lost"] > 0).any()))
+
+
+def _summed(parts: dict[str, Amount]) -> dict[str, Amount]:
+    return {**parts, "total": sum(parts.values())}

@@ -36,7 +36,13 @@ def state(totals: Totals, runs: int) -> int:
     saved = totals.state()
     kept = sum(saved[f"kept_{name}"].nbytes for name in Reported._fields)
     rest = sum(array.nbytes for array in saved.values()) - kept
-    return rest + (kept // totals.kept.count) * min(runs, totals.kept.capacity)
+    return rest + totals.kept.bytes_of_a_run * min(runs, totals.kept.capacity)
+
+
+def most_state(totals: Totals, compiled: Compiled, runs: int) -> int:
+    """The same before any run: at most as much as a call returns, whose blocks are as many as there are groups."""
+    fixed = totals.pivot.nbytes + totals.histogram.nbytes + program(compiled)["output"]
+    return fixed + totals.kept.bytes_of_a_run * min(runs, totals.kept.capacity)
 
 
 def written(tables: dict[str, pd.DataFrame]) -> dict[str, int]:
