@@ -113,28 +113,33 @@ def relative_errors(statistic: str, runs: Reported, layout: Layout) -> tuple[np.
         if statistic == "mean_error":
             return _of_error(runs.error, lost), layout.coordinates
         if statistic == "variance_actual":
-            mean = np.mean(runs.error, axis=-1, keepdims=True, where=~lost)
+            mean = _mean(runs.error, lost)[..., None]
             return _of_mean((runs.error - mean) ** 2, lost), layout.coordinates
         return _of_mean(runs.variance.astype(float), lost), layout.coordinates
 
 
 def _of_mean(value: np.ndarray, lost: np.ndarray) -> np.ndarray:
     """(1) with k = 1. Nothing but zeros is known exactly."""
-    mean, spread = (part(value, axis=-1, where=~lost) for part in (np.mean, np.std))
-    return np.where((mean == 0) & (spread == 0), 0.0, spread / np.abs(mean) / _root_n(lost))
+    mean = _mean(value, lost)
+    return np.where(_mean(np.abs(value), lost) == 0, 0.0, _stderr(value, lost) / np.abs(mean))
 
 
 def _of_error(error: np.ndarray, lost: np.ndarray) -> np.ndarray:
     """(1) for the mean error, as a share of the RMS error."""
-    spread = np.std(error, axis=-1, where=~lost)
-    rms = np.sqrt(np.mean(error**2, axis=-1, where=~lost))
-    return np.where(rms == 0, 0.0, spread / rms / _root_n(lost))
+    rms = np.sqrt(_mean(error**2, lost))
+    return np.where(rms == 0, 0.0, _stderr(error, lost) / rms)
 
 
-def _root_n(lost: np.ndarray) -> np.ndarray:
-    """The root of the runs that count less one; not a number where none does."""
-    count = (~lost).sum(-1) - 1.0
-    return np.sqrt(np.where(count > 0, count, np.nan))
+def _mean(value: np.ndarray, lost: np.ndarray) -> np.ndarray:
+    """Over the runs that are not lost; not a number where all are."""
+    return np.where(lost, 0.0, value).sum(-1) / (~lost).sum(-1)
+
+
+def _stderr(value: np.ndarray, lost: np.ndarray) -> np.ndarray:
+    """Of that mean; not a number where it is of fewer than two runs."""
+    variance = _mean((value - _mean(value, lost)[..., None]) ** 2, lost)
+    more = (~lost).sum(-1) - 1.0
+    return np.sqrt(variance / np.where(more > 0, more, np.nan))
 
 
 def _of_median(size: np.ndarray) -> np.ndarray:
