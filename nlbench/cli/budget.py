@@ -33,10 +33,12 @@ Yes = Annotated[bool, typer.Option("--yes", help="Begin whatever time, memory an
 
 def seconds(text: str | None) -> float:
     """The budget in seconds: of the option, the environment, or the default. Raises `ConfigError` for another word."""
-    given, source = (text, "--budget") if text is not None else (os.environ.get(VARIABLE), VARIABLE)
-    matched = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*(s|min|h|d)\s*", given or DEFAULT)
+    given, source = (
+        (text, "--budget") if text is not None else (os.environ.get(VARIABLE) or DEFAULT, VARIABLE)
+    )
+    matched = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*(s|min|h|d)\s*", given)
     if matched is None or not float(matched[1]):
-        raise ConfigError(f"{source}: expected a time such as 90min, 2h or 3d, found {str(given)[:40]!r}")
+        raise ConfigError(f"{source}: expected a time such as 90min, 2h or 3d, found {given[:40]!r}")
     return float(matched[1]) * UNITS[matched[2]]
 
 

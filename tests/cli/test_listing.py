@@ -7,7 +7,7 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from nlbench import doctor, engine, systems
+from nlbench import doctor, systems
 from nlbench.cli.app import app
 from nlbench.filters import catalogue
 from tests.example import VALID, spoiled, written
@@ -56,15 +56,6 @@ def test_validate_tells_programs_what_it_tells_people(tmp_path):
     assert bad.exit_code == 2
     (problem,) = json.loads(bad.stdout)["problems"]
     assert (problem["line"], problem["path"]) == (6, "filters.1.limter")
-
-
-def test_plan_says_what_a_run_needs_in_units_of_people(tmp_path, monkeypatch):
-    cost = {"runs": 20_000, "seconds": 90.0, "memory_bytes": 3 * 2**20, "filters": ["a", "b"]}
-    monkeypatch.setattr(engine, "plan", lambda experiment: cost)
-    text = invoke("plan", str(written(tmp_path, VALID)), "--runs", "1e5").stdout
-    for words in ("1.5 min", "3.0 MiB", "20,000", "a, b", "--runs 1e5"):
-        assert words in text
-    assert json.loads(invoke("plan", str(tmp_path / "fig.yaml"), "--json").stdout) == cost
 
 
 def test_doctor_ends_with_five_when_something_is_wrong(monkeypatch):

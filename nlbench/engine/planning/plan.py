@@ -144,10 +144,10 @@ def _files(experiment: Experiment, problem: Problem, totals: Totals, runs: int) 
     made["consistency"] = consistency_table(totals, made["statistics"], problem.truth.measurements)
     written = sizes.written(made)
     of_kept, rows = written.pop(sizes.KEPT), min(totals.kept.count, problem.layout.keep_runs)
-    state = sizes.state(totals, runs)
+    checkpoint = sizes.checkpoint(totals, runs)
     return {
-        "checkpoint": state,
-        "checkpoint_replaced": state,
+        "checkpoint": checkpoint,
+        "checkpoint_replaced": checkpoint,
         "tables": sum(written.values()),
         "kept_runs": of_kept * min(runs, problem.layout.keep_runs) // rows if rows else 0,
         "figures_and_report": sizes.drawn(_pictures(experiment, problem, totals), problem.layout),

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from nlbench.statistics.totals import Totals
 
 KEPT = "runs"  # the one table that grows with the runs
+ARRAY_BYTES = 270  # in the file of a checkpoint: its name, twice, and the headers of NumPy and of the archive
 # Of a picture as SVG, PNG and inside the report: measured on eight experiments of this repository.
 PICTURE_BYTES, POINT_BYTES = 230_000, 470
 
@@ -32,11 +33,16 @@ def program(compiled: Compiled) -> dict[str, int]:
 
 
 def state(totals: Totals, runs: int) -> int:
-    """Bytes of the totals, and of the checkpoint, after so many runs, from those of some runs."""
+    """Bytes of the totals after so many runs, from those of some runs."""
     saved = totals.state()
     kept = sum(saved[f"kept_{name}"].nbytes for name in Reported._fields)
     rest = sum(array.nbytes for array in saved.values()) - kept
     return rest + totals.kept.bytes_of_a_run * min(runs, totals.kept.capacity)
+
+
+def checkpoint(totals: Totals, runs: int) -> int:
+    """Bytes of the file that holds them."""
+    return state(totals, runs) + ARRAY_BYTES * len(totals.state())
 
 
 def most_state(totals: Totals, compiled: Compiled, runs: int) -> int:

@@ -36,5 +36,5 @@ def require(compiled: Compiled, totals: Totals, runs: int, threads: int, folder:
         )
 
 
-def _size(count: float) -> str:
+def _size(count: int) -> str:
     return f"{count / 1e9:.3g} GB" if count >= 1e8 else f"{count / 1e6:.3g} MB"
