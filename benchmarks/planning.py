@@ -30,7 +30,7 @@ FILES = (
     "configs/culver/orbit-polar.yaml",
     "configs/problems/re-entry.yaml",
     "configs/schwartz/d1-m11.yaml",
-    "configs/problems/ungm.yaml reference=particles",
+    "configs/problems/ungm.yaml reference=particles claims=[]",
 )
 
 
