@@ -132,6 +132,13 @@ def test_the_pictures_planned_are_those_drawn(planned_and_run):
     assert sizes.pictures(small(), layout, diverged=False) == len(list(results.path.glob("figures/*.svg")))
 
 
+@pytest.mark.parametrize(("diverged", "count"), [(False, 6), (True, 8)])
+def test_by_default_a_scalar_has_six_pictures_and_two_more_where_runs_diverge(diverged, count):
+    """RMS, mean error, variance, third moment, NEES, cost; clipped RMS and divergence."""
+    every = small().model_copy(update={"figures": None})
+    assert sizes.pictures(every, make(small()).layout, diverged) == count
+
+
 def test_the_size_of_the_totals_is_foretold_from_fewer_runs(compiled):
     few, many = Totals(compiled.problem.layout), Totals(compiled.problem.layout)
     few.add(0, compiled.sums(0, 2, 128))

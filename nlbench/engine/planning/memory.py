@@ -22,7 +22,8 @@ def memory(
     """Bytes by what they are for.
 
     state: of the totals. kept: values in the table of runs. held: by this process after it made the program, grown: by
-    how much while it made it; as much is taken again when each filter is compiled alone.
+    how much while it made it; as much is taken again when each filter is compiled alone, after totals are saved and
+    tables made.
     """
     program = sizes.program(compiled)
     call = program["argument"] + program["output"] + program["temp"]
@@ -31,7 +32,6 @@ def memory(
         "process": held,
         "calls": threads * (call + WAITING * program["output"]),
         "totals": state,
-        "saving_and_tables": max(COPIES * state, (ROW + 32 * columns) * kept),
-        "filters_alone": grown,
+        "finishing": max(COPIES * state, (ROW + 32 * columns) * kept, grown),
         "libraries": LIBRARIES,
     }
