@@ -42,9 +42,8 @@ if TYPE_CHECKING:
 
 PILOT_RUNS = 4096
 FEWEST = 2048  # that the totals always keep one by one
-MARGIN = (
-    1.25  # in runs: 12 % in the standard error, since the pilot's own is uncertain and tails may be heavy
-)
+# In runs: 12 % in the standard error, since the pilot's own is uncertain and tails may be heavy.
+MARGIN = 1.25
 MOST_RUNS = 10**9
 
 
