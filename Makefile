@@ -10,13 +10,14 @@ OPTIONS ?=
 PYTEST_OPTIONS ?= -m "not long"
 
 .DEFAULT_GOAL := help
-.PHONY: help run test check format lint types bench lock clean
+.PHONY: help run test check format lint types bench docs lock clean
 
 help:
 	@echo "make run     run $(EXPERIMENT) and write its report"
 	@echo "make test    run the tests"
 	@echo "make check   format, lint, types and tests"
 	@echo "make bench   run the benchmarks"
+	@echo "make docs    build the documentation in site/, every link checked"
 	@echo "make lock    renew the lock files"
 	@echo "make clean   remove caches and .venv (results stay)"
 
@@ -55,11 +56,22 @@ types: $(VENV)/dev.stamp
 bench: $(VENV)/dev.stamp
 	@$(BIN)/python -m benchmarks
 
+$(VENV)/docs.stamp: requirements-docs.lock $(VENV)/run.stamp
+	@echo "adding the tools for the documentation ..."
+	@$(INSTALL) requirements-docs.lock
+	@touch $@
+
+docs: $(VENV)/docs.stamp
+	@$(BIN)/python -m docs.generator
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict --config-file build/docs/mkdocs.yml
+	@echo "site/index.html"
+
 # Needs uv. hatchling and editables install the package itself. The second file holds all of the first, in the same versions.
 lock:
 	printf 'hatchling\neditables\n' | $(LOCK) pyproject.toml - -o requirements.lock
 	printf 'hatchling\neditables\n' | $(LOCK) pyproject.toml - --extra test --extra dev -c requirements.lock -o requirements-dev.lock
+	$(LOCK) pyproject.toml --extra docs -c requirements.lock -o requirements-docs.lock
 
 clean:
-	rm -rf $(VENV) .hypothesis .mypy_cache .pytest_cache .ruff_cache build dist
+	rm -rf $(VENV) .hypothesis .mypy_cache .pytest_cache .ruff_cache build dist site
 	find nlbench tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from pydantic import Field
+
 from nlbench.config import consistency
 from nlbench.config.claim import Claim
 from nlbench.config.explain import Finding, found, plain, validated
@@ -39,10 +41,14 @@ SECTIONS: dict[str, type[Section]] = {
 class Named(Section):
     """What every entry of `filters` has, apart from the filter's own options."""
 
-    name: str
-    label: Label | None = None
-    model: dict[str, Any] | None = None
-    initial: dict[str, Any] | None = None
+    name: str = Field(description="the filter")
+    label: Label | None = Field(
+        default=None, description="what tables and figures call it; default: its name"
+    )
+    model: dict[str, Any] | None = Field(
+        default=None, description="parameters of the system as this filter believes them"
+    )
+    initial: dict[str, Any] | None = Field(default=None, description="moments that this filter starts from")
 
 
 def assemble(raw: Mapping[str, Any], question: str = "") -> tuple[Experiment | None, list[Finding]]:

@@ -27,8 +27,8 @@ Moments = Annotated[dict[str, Finite], Field(min_length=1)]
 class Claim(Section):
     """Exactly one of `less`, `equal` and `of` says which filters are compared, or with what each of them is."""
 
-    id: Label
-    says: Line
+    id: Label = Field(description="what tables and reports call it")
+    says: Line = Field(description="the claim in words, best those of the source")
     where: Line | None = Field(default=None, description="section and page of the source")
     whose: Literal["source", "ours"] = Field(
         default="source", description="only the source's claims decide whether its figures are reproduced"
@@ -38,7 +38,7 @@ class Claim(Section):
         min_length=1,
         description="which of the source's figures and tables it is about; default: all",
     )
-    statistic: Statistic | PrintedMoment
+    statistic: Statistic | PrintedMoment = Field(description="which statistic is compared")
     coordinate: str | None = Field(default=None, description="default: the first; of `diverged`: all")
     at: list[Positive] = Field(default_factory=list, description="report times; default: all")
     less: list[str] | None = Field(

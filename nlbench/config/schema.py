@@ -85,9 +85,11 @@ class FilterSpec(Section):
 class Initial(Section):
     """Initial moments; a variance is short for a diagonal covariance."""
 
-    mean: Finite | list[Finite] | None = None
-    cov: list[list[Finite]] | None = None
-    variance: Annotated[float, Field(ge=0)] | list[Annotated[float, Field(ge=0)]] | None = None
+    mean: Finite | list[Finite] | None = Field(default=None, description="of the state")
+    cov: list[list[Finite]] | None = Field(default=None, description="covariance, symmetric, as rows")
+    variance: Annotated[float, Field(ge=0)] | list[Annotated[float, Field(ge=0)]] | None = Field(
+        default=None, description="the diagonal of the covariance, instead of it"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> Initial:
@@ -145,9 +147,9 @@ class MonteCarlo(Section):
 class Source(Section):
     """The publication that the experiment reproduces."""
 
-    document: str | None = None
-    figures: list[str] = Field(default_factory=list)
-    tables: list[str] = Field(default_factory=list)
+    document: str | None = Field(default=None, description="the publication, such as culver-1969")
+    figures: list[str] = Field(default_factory=list, description="numbers of its figures, such as '7.18'")
+    tables: list[str] = Field(default_factory=list, description="numbers of its tables")
     runs: int | None = Field(default=None, ge=1, description="the source's number of runs")
 
 
@@ -159,7 +161,7 @@ class EngineSpec(Section):
     )
     threads: int | None = Field(default=None, ge=1, le=4096, description="default: one for each core")
     block: int = Field(default=64, ge=1, le=65536, description="trajectories in a block")
-    precision: Literal["float64", "float32"] = "float64"
+    precision: Literal["float64", "float32"] = Field(default="float64", description="of all that is computed")
     cost: bool = Field(default=True, description="measure what each filter costs, compiled by itself")
 
 

@@ -51,11 +51,17 @@ class Parameters(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    ensemble: Literal["matched", "conditioned", "normal", "thesis-sets"] = "matched"
+    ensemble: Literal["matched", "conditioned", "normal", "thesis-sets"] = Field(
+        default="matched", description="how initial states are drawn"
+    )
     set_size: int = Field(default=80, ge=2, le=1000, description="runs in a set, for thesis-sets")
-    dynamics: Literal["nonlinear", "linear"] = "nonlinear"
+    dynamics: Literal["nonlinear", "linear"] = Field(
+        default="nonlinear", description="the quadratic drift, or decay alone"
+    )
     decay: float = Field(default=2.0, ge=0.0, description="rate of the linear dynamics, 1/s")
-    measurement: Literal["none", "linear", "quadratic", "continuous"] = "linear"
+    measurement: Literal["none", "linear", "quadratic", "continuous"] = Field(
+        default="linear", description="x, or 3 x - .5 x^2, at times; x continuously; or nothing"
+    )
     interval: float = Field(
         default=0.1, gt=0.0, description="time between measurements, s, where they are not continuous"
     )

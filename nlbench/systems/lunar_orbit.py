@@ -94,7 +94,9 @@ class Parameters(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    case: Literal["100-mile", "500-mile"] = "100-mile"
+    case: Literal["100-mile", "500-mile"] = Field(
+        default="100-mile", description="which orbit, with its variances, sightings and step"
+    )
     coordinates: Literal["cartesian", "polar"] = Field(default="cartesian", description="state of the filter")
     initial_cov: Literal["diagonal", "transformed"] = Field(
         default="diagonal", description="of a polar filter: its own, or that of the Cartesian one"
@@ -103,7 +105,9 @@ class Parameters(BaseModel):
     trigger: Literal["filter", "nominal"] = Field(
         default="filter", description="whose central angle a sighting waits for"
     )
-    initial_error: Literal["gaussian"] | InitialError = "gaussian"
+    initial_error: Literal["gaussian"] | InitialError = Field(
+        default="gaussian", description="draws, or errors of fixed size in a pattern of signs"
+    )
     errors: Literal["local-vertical", "cartesian", "polar"] = Field(
         default="local-vertical", description="axes of the errors"
     )

@@ -51,10 +51,14 @@ class Parameters(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    ensemble: Literal["matched", "normal", "thesis-sets"] = "matched"
+    ensemble: Literal["matched", "normal", "thesis-sets"] = Field(
+        default="matched", description="how damping ratios are drawn"
+    )
     set_size: int = Field(default=20, ge=2, le=1000, description="runs in a set, for thesis-sets")
     damping_variance: float = Field(default=0.16, gt=0.0, description="variance of the damping ratio")
-    measurement: Literal["none", "linear"] = "linear"
+    measurement: Literal["none", "linear"] = Field(
+        default="linear", description="position and velocity, or nothing"
+    )
     interval: float = Field(default=0.2, gt=0.0, description="time between measurements, s")
     measurement_variance: float = Field(
         default=50.0, gt=0.0, description="variance of each measurement's noise"

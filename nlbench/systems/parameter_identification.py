@@ -45,7 +45,9 @@ class Parameters(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    ensemble: Literal["matched", "normal"] = "matched"
+    ensemble: Literal["matched", "normal"] = Field(
+        default="matched", description="how coefficients are drawn"
+    )
     coefficient_mean: float = Field(default=0.5, description="mean of the coefficient")
     coefficient_deviation: float = Field(
         default=0.23, gt=0.0, description="standard deviation of the coefficient"

@@ -44,7 +44,9 @@ class Parameters(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    measurement: Literal["bearing", "range-and-bearing"] = "bearing"
+    measurement: Literal["bearing", "range-and-bearing"] = Field(
+        default="bearing", description="what the sonar tells"
+    )
     bearing_deviation: float = Field(default=1.0, gt=0.0, description="noise of bearings close by, degrees")
     range_deviation: float = Field(default=100.0, gt=0.0, description="noise of ranges close by, m")
     noise_range: float | None = Field(

@@ -1,0 +1,122 @@
+"""The JSON Schema of experiment files, for editors: names, keys, ranges and defaults as `validate` knows them.
+
+It is looser than `validate`, which also sees whether filters fit the system, times fit each other and labels exist.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from pydantic import BaseModel
+
+from nlbench import systems
+from nlbench.config.assemble import MANDATORY, SECTIONS, Named
+from nlbench.config.claim import Claim
+from nlbench.config.schema import Experiment, Head, Initial, TimeSpec
+from nlbench.filters import catalogue
+
+Schema = dict[str, Any]
+DIGITS = "^[0-9][0-9_]*$"  # 20_000, which YAML 1.2 and so editors read as text
+
+
+def json_schema() -> Schema:
+    """The schema of a whole file (JSON Schema 2020-12)."""
+    definitions: Schema = {}
+    properties = {**_properties(Head, definitions)}
+    for key, model in {**SECTIONS, "time": TimeSpec, "initial": Initial}.items():
+        properties[key] = {**_model(model, definitions), "required": []}
+    properties |= {
+        "system": _system(definitions),
+        "truth": {
+            "type": "object",
+            "description": "parameters of the system that makes the data, where it differs",
+        },
+        "filters": {
+            "type": "array",
+            "minItems": 1,
+            "items": _filters(definitions),
+            "description": "the filters to compare, all on the same runs",
+        },
+        "claims": {
+            "type": "array",
+            "items": _model(Claim, definitions),
+            "description": "what is expected of the filters",
+        },
+    }
+    schema = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "nlbench experiment",
+        "type": "object",
+        "additionalProperties": False,
+        "required": list(MANDATORY),
+        "properties": {key: properties[key] for key in Experiment.model_fields if key in properties},
+        "$defs": dict(sorted(definitions.items())),
+    }
+    return _with_digits(schema)
+
+
+def _model(model: type[BaseModel], definitions: Schema) -> Schema:
+    found = model.model_json_schema(ref_template="#/$defs/{model}")
+    definitions.update(found.pop("$defs", {}))
+    found.pop("title", None)
+    return found
+
+
+def _properties(model: type[BaseModel], definitions: Schema) -> Schema:
+    return _model(model, definitions).get("properties", {})
+
+
+def _entry(name: Schema, properties: Schema) -> Schema:
+    return {
+        "type": "object",
+        "additionalProperties": False,
+        "required": ["name"],
+        "properties": {"name": name, **properties},
+    }
+
+
+def _system(definitions: Schema) -> Schema:
+    named = [
+        _entry(
+            {"const": name, "description": systems.summary(name)},
+            _properties(systems.parameters(name), definitions),
+        )
+        for name in systems.available()
+    ]
+    return {
+        "description": "the system, by name, and its parameters",
+        "anyOf": [{"enum": list(systems.available())}, *named],
+    }
+
+
+def _filters(definitions: Schema) -> Schema:
+    """A name alone, or a mapping; one alternative for all names that take the same options."""
+    common = {key: value for key, value in _properties(Named, definitions).items() if key != "name"}
+    groups: dict[type[BaseModel], list[str]] = {}
+    for name, model in _options():
+        names = groups.setdefault(model, [])
+        names += [name] if name not in names else []
+    entries = [
+        _entry({"enum": names}, {**_properties(model, definitions), **common})
+        for model, names in groups.items()
+    ]
+    return {"anyOf": [{"enum": list(catalogue.available())}, *entries]}
+
+
+def _options() -> Iterable[tuple[str, type[BaseModel]]]:
+    for name in catalogue.available():
+        for kind in catalogue.takes(name):
+            yield name, catalogue.options(name, *kind)
+
+
+def _with_digits(schema: Any) -> Any:
+    """Numbers may also be digits grouped by underscores."""
+    if isinstance(schema, list):
+        return [_with_digits(each) for each in schema]
+    if not isinstance(schema, dict):
+        return schema
+    found = {key: _with_digits(value) for key, value in schema.items()}
+    if found.get("type") in ("integer", "number"):
+        found |= {"type": [found["type"], "string"], "pattern": DIGITS}
+    return found
