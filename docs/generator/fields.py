@@ -31,7 +31,13 @@ def of(model: type[BaseModel], without: tuple[str, ...] = ()) -> str:
 
 
 def _default(value: Any) -> str:
-    return "" if value is None else f"`{value}`" if isinstance(value, (dict, list)) else escaped(found(value))
+    """A default as the file would state it; None is left empty."""
+    if isinstance(value, dict):
+        given = ", ".join(f"{key}: {each}" for key, each in value.items() if each is not None)
+        return f"`{{{given}}}`"
+    if isinstance(value, (list, str)):
+        return f"`{value}`"
+    return "" if value is None else escaped(found(value))
 
 
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:

@@ -12,6 +12,11 @@ from nlbench.filters import catalogue
 from nlbench.row import Row
 
 NOTES = Path(__file__).parent.parent / "filters" / "notes.yaml"
+TITLES = {
+    "moment.md": "Moment filters",
+    "continuous.md": "Filters for continuous measurements",
+    "discrete.md": "Filters for discrete time",
+}
 CARRIED = {
     0: "a density (points, particles or an exact form)",
     1: "mean and covariance, linearised",
@@ -83,7 +88,7 @@ def page(name: str, note: Note) -> str:
     for kind in catalogue.takes(name):
         rows.setdefault(catalogue.row(name, *kind), []).append(catalogue.KINDS[kind])
     parts = [f"# {name}", text.escaped(f"{catalogue.summary(name)}.")]
-    parts.append(f"Derivation, and the filters beside it: [{note.see.split('#')[0]}]({note.see}).")
+    parts.append(f"Derivation, and the filters beside it: [{TITLES[note.see.split('#')[0]]}]({note.see}).")
     if note.known:
         parts += ["## What is known of it", "\n".join(f"- {each}" for each in note.known)]
     for row, kinds in rows.items():
@@ -94,14 +99,13 @@ def page(name: str, note: Note) -> str:
 def _section(row: Row) -> list[str]:
     docs = {module: text.docstring(module) for module in modules(row)}
     facts = [
-        ("is", row.says),
         ("source", row.source),
         ("carries", CARRIED[row.order]),
         *((word.lower(), " ".join(said)) for word in ("Cost", "Fails") if (said := _said(docs, word))),
     ]
     if row.family == "moment":
         facts.append(("cost of propagation", f"O(n^{row.order + 1}) a stage of integration"))
-    parts = [text.table(("", ""), [(word, text.cell(said)) for word, said in facts])]
+    parts = [text.table(("is", text.cell(row.says)), [(word, text.cell(said)) for word, said in facts])]
     parts += ["### Options", fields.of(row.options), "### Equations, as the code numbers them"]
     for module, said in docs.items():
         parts += [f"`{module}`", text.markdown(said)]

@@ -67,4 +67,4 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def sentences(text: str, word: str) -> list[str]:
     """The sentences of a docstring that begin with a word, such as Cost or Fails."""
     flat = " ".join(text.split())
-    return re.findall(rf"(?:(?<=[.)] )|^)({word}\b.*?\.)(?= [A-Z(]|$)", flat)
+    return re.findall(rf"(?:(?<=[.)] )|^)({word}\b.*?\.)(?= [A-Z(`]|$)", flat)
