@@ -34,9 +34,19 @@ def page(written: str) -> str:
         parts += _entry(name, getattr(importlib.import_module(module), name))
     for name, module in modules:
         parts += [f"## {name}", _verbatim(module)]
-        for member in getattr(module, "__all__", ()):
+        for member in _public(module):
             parts += _entry(f"{name}.{member}", getattr(module, member), level=3)
     return "\n\n".join(parts) + "\n"
+
+
+def _public(module: ModuleType) -> list[str]:
+    """What a module lists as public, or else the functions that it defines under public names."""
+    defined = [
+        name
+        for name, found in vars(module).items()
+        if inspect.isfunction(found) and found.__module__ == module.__name__ and not name.startswith("_")
+    ]
+    return list(getattr(module, "__all__", defined))
 
 
 def _entry(name: str, found: Any, level: int = 2) -> Iterator[str]:
@@ -66,7 +76,9 @@ def _signature(found: Any) -> str:
         signature = inspect.signature(found)
     except (TypeError, ValueError):
         return "(...)"
-    kept = [each.replace(annotation=each.empty) for each in signature.parameters.values()]
+    kept = [
+        each.replace(annotation=each.empty) for name, each in signature.parameters.items() if name != "self"
+    ]
     return str(signature.replace(parameters=kept, return_annotation=signature.empty))
 
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import ast
 import importlib.util
 import re
+import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-SPECIAL = re.compile(r"([*_<>|\[\]$\\&#~])")
+# What Python-Markdown lets a backslash escape, and what it does not.
+SPECIAL = re.compile(r"([*_|\[\]\\#])")
+ENTITIES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "$": "&#36;"})
 EXIT = re.compile(r"(`[^`]*`)")
 
 
@@ -30,7 +33,7 @@ def markdown(text: str) -> str:
         if prose:
             blocks.append("\n".join(prose))
         if verbatim:
-            blocks.append("```text\n" + "\n".join(verbatim).rstrip() + "\n```")
+            blocks.append("```text\n" + textwrap.dedent("\n".join(verbatim)).rstrip() + "\n```")
         prose.clear()
         verbatim.clear()
 
@@ -48,7 +51,8 @@ def escaped(text: str) -> str:
     """Prose in which no character means anything to Markdown, code spans apart."""
     parts = EXIT.split(text)
     return "".join(
-        part if part.startswith("`") and len(part) > 1 else SPECIAL.sub(r"\\\1", part) for part in parts
+        part if part.startswith("`") and len(part) > 1 else SPECIAL.sub(r"\\\1", part).translate(ENTITIES)
+        for part in parts
     )
 
 

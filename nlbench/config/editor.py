@@ -22,12 +22,12 @@ DIGITS = "^[0-9][0-9_]*$"  # 20_000, which YAML 1.2 and so editors read as text
 
 def json_schema() -> Schema:
     """The schema of a whole file (JSON Schema 2020-12)."""
-    definitions: Schema = {}
-    properties = {**_properties(Head, definitions)}
-    for key, model in {**SECTIONS, "time": TimeSpec, "initial": Initial}.items():
-        properties[key] = {**_model(model, definitions), "required": []}
+    properties = _properties(Head)
+    sections: dict[str, type[BaseModel]] = {**SECTIONS, "time": TimeSpec, "initial": Initial}
+    for key, model in sections.items():
+        properties[key] = {**_model(model), "required": []}
     properties |= {
-        "system": _system(definitions),
+        "system": _system(),
         "truth": {
             "type": "object",
             "description": "parameters of the system that makes the data, where it differs",
@@ -35,12 +35,12 @@ def json_schema() -> Schema:
         "filters": {
             "type": "array",
             "minItems": 1,
-            "items": _filters(definitions),
+            "items": _filters(),
             "description": "the filters to compare, all on the same runs",
         },
         "claims": {
             "type": "array",
-            "items": _model(Claim, definitions),
+            "items": _model(Claim),
             "description": "what is expected of the filters",
         },
     }
@@ -51,20 +51,29 @@ def json_schema() -> Schema:
         "additionalProperties": False,
         "required": list(MANDATORY),
         "properties": {key: properties[key] for key in Experiment.model_fields if key in properties},
-        "$defs": dict(sorted(definitions.items())),
     }
     return _with_digits(schema)
 
 
-def _model(model: type[BaseModel], definitions: Schema) -> Schema:
-    found = model.model_json_schema(ref_template="#/$defs/{model}")
-    definitions.update(found.pop("$defs", {}))
-    found.pop("title", None)
-    return found
+def _model(model: type[BaseModel]) -> Schema:
+    """The schema of a model, with those of the models that it holds in their places: two may have one name."""
+    found = model.model_json_schema()
+    definitions = found.pop("$defs", {})
+
+    def inlined(part: Any) -> Any:
+        if isinstance(part, list):
+            return [inlined(each) for each in part]
+        if not isinstance(part, dict):
+            return part
+        part = dict(part)
+        held = definitions[part.pop("$ref").removeprefix("#/$defs/")] if "$ref" in part else {}
+        return {key: inlined(value) for key, value in {**held, **part}.items() if key != "title"}
+
+    return inlined(found)
 
 
-def _properties(model: type[BaseModel], definitions: Schema) -> Schema:
-    return _model(model, definitions).get("properties", {})
+def _properties(model: type[BaseModel]) -> Schema:
+    return _model(model).get("properties", {})
 
 
 def _entry(name: Schema, properties: Schema) -> Schema:
@@ -76,11 +85,11 @@ def _entry(name: Schema, properties: Schema) -> Schema:
     }
 
 
-def _system(definitions: Schema) -> Schema:
+def _system() -> Schema:
     named = [
         _entry(
             {"const": name, "description": systems.summary(name)},
-            _properties(systems.parameters(name), definitions),
+            _properties(systems.parameters(name)),
         )
         for name in systems.available()
     ]
@@ -90,17 +99,14 @@ def _system(definitions: Schema) -> Schema:
     }
 
 
-def _filters(definitions: Schema) -> Schema:
+def _filters() -> Schema:
     """A name alone, or a mapping; one alternative for all names that take the same options."""
-    common = {key: value for key, value in _properties(Named, definitions).items() if key != "name"}
+    common = {key: value for key, value in _properties(Named).items() if key != "name"}
     groups: dict[type[BaseModel], list[str]] = {}
     for name, model in _options():
         names = groups.setdefault(model, [])
         names += [name] if name not in names else []
-    entries = [
-        _entry({"enum": names}, {**_properties(model, definitions), **common})
-        for model, names in groups.items()
-    ]
+    entries = [_entry({"enum": names}, {**_properties(model), **common}) for model, names in groups.items()]
     return {"anyOf": [{"enum": list(catalogue.available())}, *entries]}
 
 

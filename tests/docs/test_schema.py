@@ -1,0 +1,89 @@
+"""Claim: the published JSON Schema is that of the models, and takes what `validate` takes."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from docs.generator import site
+from nlbench import config, systems
+from nlbench.config.editor import json_schema
+from nlbench.config.schema import Experiment
+from nlbench.errors import ConfigError
+from nlbench.filters import catalogue
+
+CONFIGS = sorted((Path(__file__).parents[2] / "configs").rglob("*.yaml"))
+
+
+def test_the_published_file_is_that_of_the_models():
+    assert site.SCHEMA.read_text() == site.schema_text(), "renew it: python -m docs.generator --schema"
+
+
+def test_it_knows_every_key_system_and_filter():
+    schema = json_schema()
+    assert set(schema["properties"]) == set(Experiment.model_fields) - {"question"}
+    names = lambda part: set(part["anyOf"][0]["enum"])  # noqa: E731
+    assert names(schema["properties"]["system"]) == set(systems.available())
+    assert names(schema["properties"]["filters"]["items"]) == set(catalogue.available())
+
+
+@pytest.fixture(scope="module")
+def validator():
+    validators = pytest.importorskip("jsonschema").validators
+    schema = json_schema()
+    kind = validators.validator_for(schema)
+    kind.check_schema(schema)
+    return kind(schema)
+
+
+def read(path: Path):
+    """As an editor reads it: YAML 1.2, in which 20_000 is text."""
+    return plain(YAML(typ="safe", pure=True).load(path.read_text()))
+
+
+def plain(value):
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    return [plain(item) for item in value] if isinstance(value, list) else value
+
+
+def test_it_takes_all_experiments(validator):
+    assert len(CONFIGS) > 90
+    wrong = {path.name: error.message for path in CONFIGS for error in validator.iter_errors(read(path))}
+    assert wrong == {}
+
+
+def test_digits_may_be_grouped(validator):
+    given = read(CONFIGS[-1]) | {"monte_carlo": {"runs": "20_000"}}
+    assert validator.is_valid(given)
+    assert not validator.is_valid(given | {"monte_carlo": {"runs": "many"}})
+
+
+def wrongs():
+    """Changes that both must refuse."""
+    return {
+        "a key misspelt": lambda data: data.update(monte_carl={"runs": 3}),
+        "a key of a section misspelt": lambda data: data.update(monte_carlo={"run": 3}),
+        "an unknown filter": lambda data: data.update(filters=["efk"]),
+        "an option of another filter": lambda data: data.update(filters=[{"name": "ekf", "particles": 3}]),
+        "an unknown system": lambda data: data.update(system="pendulum"),
+        "a parameter of another system": lambda data: data.update(system={"name": "oscillator", "decay": 1}),
+        "a negative step": lambda data: data.update(time={"step": -1}),
+        "text for a number": lambda data: data.update(monte_carlo={"seed": "yes"}),
+        "a wrong statistic": lambda data: data.update(claims=[{"id": "A", "says": "b", "statistic": "rsm"}]),
+        "no system": lambda data: data.pop("system"),
+    }
+
+
+@pytest.mark.parametrize("change", wrongs())
+def test_it_refuses_what_validate_refuses(validator, change):
+    data = {"experiment": "small", "system": "oscillator", "filters": ["ekf"]}
+    assert validator.is_valid(data)
+    config.from_dict(copy.deepcopy(data))
+    wrongs()[change](data)
+    assert not validator.is_valid(data)
+    with pytest.raises(ConfigError):
+        config.from_dict(data)
