@@ -67,7 +67,9 @@ def _model(model: type[BaseModel]) -> Schema:
             return part
         part = dict(part)
         held = definitions[part.pop("$ref").removeprefix("#/$defs/")] if "$ref" in part else {}
-        return {key: inlined(value) for key, value in {**held, **part}.items() if key != "title"}
+        merged = {key: inlined(value) for key, value in {**held, **part}.items()}
+        # The titles that pydantic makes of names say nothing; a key named title has a mapping.
+        return {key: value for key, value in merged.items() if key != "title" or isinstance(value, dict)}
 
     return inlined(found)
 
