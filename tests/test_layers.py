@@ -83,6 +83,7 @@ ALLOWED: dict[str, set[str]] = {
         *BASE,
     },
     "doctor": {"engine", *BASE},
+    "perf": {"config", "engine", "results", *BASE},
     "cli": {
         "config",
         "systems",
@@ -93,6 +94,7 @@ ALLOWED: dict[str, set[str]] = {
         "report",
         "reproduce",
         "doctor",
+        "perf",
         *BASE,
     },
     "__main__": {"cli"},

@@ -1,0 +1,1 @@
+"""Performance of the filters as ratios to a frozen kernel, compared with a baseline."""
