@@ -60,7 +60,7 @@ def perf(
         raise NothingCompared(f"{path}: has none of {', '.join(counts)}")
     timer = timing.Timer(kernel.reference(), {each.name: each.call for each in chosen}, timing.clock())
     if before is None:
-        estimates = gate.measured(timer.rounds, list(counts))
+        estimates = gate.measured(timer.rounds, list(counts), gate.RECORDED_BAND if record else math.inf)
         if record:
             write(path, of(identity(), machine, estimates, counts))
         findings = [gate.Finding(name, each, None, None, gate.NEW, {}) for name, each in estimates.items()]

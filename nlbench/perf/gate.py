@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ from nlbench.perf.verdict import SLOWER, UNDECIDED, Change, Estimate, change, es
 
 ROUNDS = 15
 MOST_ROUNDS = 120  # of a batch
-RECORD_ROUNDS = 45
+RECORDED_BAND = 0.01  # that a baseline should have: it enters every later comparison
 NEW, COUNTS = "new", "counts rose"
 FAILURES = (SLOWER, COUNTS)
 Rounds = Callable[[Sequence[str], int], Mapping[str, np.ndarray]]
@@ -30,9 +31,9 @@ class Finding(NamedTuple):
     risen: dict[str, float]
 
 
-def measured(rounds: Rounds, names: Sequence[str], count: int = RECORD_ROUNDS) -> dict[str, Estimate]:
-    """Estimates of `count` rounds."""
-    return {name: estimate(seconds) for name, seconds in rounds(names, count).items()}
+def measured(rounds: Rounds, names: Sequence[str], wanted: float = math.inf) -> dict[str, Estimate]:
+    """Estimates whose bands are at most `wanted`, if the limit of rounds allows."""
+    return _batch(rounds, names, lambda _, now: now.band > wanted)
 
 
 def compared(
@@ -48,7 +49,7 @@ def compared(
     first = _decided(rounds, known, baseline, budget)
     suspects = [name for name in known if _verdict(first[name], baseline, name, budget) == SLOWER]
     second = _decided(rounds, suspects, baseline, budget)
-    single = measured(rounds, new, ROUNDS)
+    single = measured(rounds, new)
     found = []
     for name in counts:
         if name in new:
@@ -67,19 +68,23 @@ def compared(
 
 
 def _decided(rounds: Rounds, names: Sequence[str], baseline: Baseline, budget: float) -> dict[str, Estimate]:
-    """A batch: estimates from as many rounds as each workload needs to be decided, up to the limit."""
+    """A batch until each workload is decided, if the limit of rounds allows."""
+    return _batch(rounds, names, lambda name, now: _verdict(now, baseline, name, budget) == UNDECIDED)
+
+
+def _batch(
+    rounds: Rounds, names: Sequence[str], unsettled: Callable[[str, Estimate], bool]
+) -> dict[str, Estimate]:
+    """Estimates from as many rounds as each workload needs, `MOST_ROUNDS` at most."""
     seconds: dict[str, np.ndarray] = {}
     estimates: dict[str, Estimate] = {}
-    open_names = list(names)
-    while open_names:
-        for name, more in rounds(open_names, ROUNDS).items():
+    left = list(names)
+    while left:
+        for name, more in rounds(left, ROUNDS).items():
             seconds[name] = np.concatenate([seconds[name], more]) if name in seconds else more
             estimates[name] = estimate(seconds[name])
-        open_names = [
-            name
-            for name in open_names
-            if estimates[name].rounds < MOST_ROUNDS
-            and _verdict(estimates[name], baseline, name, budget) == UNDECIDED
+        left = [
+            name for name in left if len(seconds[name]) < MOST_ROUNDS and unsettled(name, estimates[name])
         ]
     return estimates
 
