@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from nlbench.config import Experiment
     from nlbench.engine.problem import Problem, Runner
 
-BLOCKS = 8
+BLOCKS = 10
 SEED = 1969
 _COMPILED = "/jax/core/compile/backend_compile_duration"
 _compilations: list[float] = []
