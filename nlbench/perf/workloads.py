@@ -130,9 +130,9 @@ def _listen() -> None:
     """Count compilations from now on."""
     import jax
 
-    def heard(event: str, seconds: float, **_: Any) -> None:
+    def heard(event: str, duration_secs: float, **_: str | int) -> None:
         if event == _COMPILED:
-            _compilations.append(seconds)
+            _compilations.append(duration_secs)
 
     if not _listening:
         _listening.append(True)

@@ -1,6 +1,6 @@
 """Claim: the command finds filters that do 1.3 times the work and passes filters unchanged, each 20 times of 20.
 
-pytest -m long tests/perf/test_planted.py -s, on a machine that does nothing else.
+pytest -m long tests/perf/test_planted.py, on a machine that does nothing else.
 """
 
 from __future__ import annotations
@@ -46,6 +46,5 @@ def test_each_of_twenty_calls_decides_rightly(tmp_path, blocks, code, expected):
         done = perf(blocks, "--baseline", file, "--json")
         codes[done.returncode] += 1
         verdicts.update(each["verdict"] for each in json.loads(done.stdout)["workloads"])
-        print(dict(codes), dict(verdicts), flush=True)
     assert codes == {code: TIMES}
     assert verdicts[expected] > 0
