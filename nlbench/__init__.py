@@ -10,6 +10,7 @@ _HOMES = {
     "System": "nlbench.systems.system",
     "DiscreteSystem": "nlbench.systems.discrete",
     "Coordinate": "nlbench.systems.system",
+    "compare": "nlbench.comparison",
     "configure": "nlbench.runtime",
     "filter_data": "nlbench.filters.data",
     "load": "nlbench.config",

@@ -68,6 +68,7 @@ ALLOWED: dict[str, set[str]] = {
         *BASE,
         *CORE,
     },
+    "comparison": {"config", "statistics", "results", "errors", "suggestions"},
     "figures": {"results", "errors"},
     "report": {"results", "figures", "errors"},
     "reproduce": {
@@ -90,6 +91,7 @@ ALLOWED: dict[str, set[str]] = {
         "filters.catalogue",
         "engine",
         "results",
+        "comparison",
         "figures",
         "report",
         "reproduce",

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from nlbench.cli import filter, listing, output, perf, preview, reproduce, run, saved
+from nlbench.cli import compare, filter, listing, output, perf, preview, reproduce, run, saved
 from nlbench.errors import EnvironmentFault, Interrupted, NlbenchError
 
 HELP = """Monte Carlo benchmarks of nonlinear filters.
@@ -111,6 +111,7 @@ app.command("list")(listing.show)
 app.command("report")(saved.report)
 app.command("replay")(saved.replay)
 app.command("reproduce")(reproduce.reproduce)
+app.command("compare")(compare.compare)
 app.command("filter")(filter.filter_recorded)
 app.command("perf")(perf.perf)
 app.command("doctor")(preview.doctor)

@@ -1,0 +1,99 @@
+"""`nlbench compare`: is one finished run worse than another."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nlbench.cli import options, output
+from nlbench.errors import ConfigError, GateError
+
+
+def compare(
+    a: Annotated[
+        Path,
+        typer.Argument(
+            metavar="A", help="What was: the folder of a run, or its experiment file.", show_default=False
+        ),
+    ],
+    b: Annotated[Path, typer.Argument(metavar="B", help="What is now: likewise.", show_default=False)],
+    margin: Annotated[
+        str, typer.Option("--margin", metavar="M", help="Changes that do not matter: 1% or 0.01.")
+    ] = "1%",
+    alpha: Annotated[
+        str,
+        typer.Option(
+            "--alpha",
+            metavar="P",
+            help="Probability of any false alarm, all comparisons together: 1% or .01.",
+        ),
+    ] = "1%",
+    statistic: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--statistic",
+            metavar="NAME",
+            help="A statistic at the report times instead of the usual ones; repeatable.",
+        ),
+    ] = None,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Every statistic, at the report times and over all times.")
+    ] = False,
+    two_sided: Annotated[
+        bool, typer.Option("--two-sided", help="Fail where B is better by more than the margin, too.")
+    ] = False,
+    out: options.Out = Path("results"),
+    markdown: Annotated[
+        bool, typer.Option("--markdown", help="Print Markdown, for the summary of a CI job.")
+    ] = False,
+    json: options.Json = False,
+) -> None:
+    """Compare two finished runs: is B worse than A by more than a margin?
+
+    Compared are the RMS errors (clipped, for a filter that diverged) at the report times that both have, and the
+    fractions of runs that diverged. Runs with one seed saw the same truth and noise and are paired; otherwise
+    they are tested as independent. All tests share Holm's correction.
+
+    Exit code 3 if B is worse: a significant change beyond the margin, or a filter that failed in B only. 0 if not;
+    changes within the margin and for the better are shown. 7 if the runs have nothing in common.
+    """
+    if statistic and everything:
+        raise ConfigError("--statistic and --all exclude each other")
+    if markdown and json:
+        raise ConfigError("--markdown and --json exclude each other")
+    numbers = _number("--margin", margin), _number("--alpha", alpha)
+    folders = _folder(a, out), _folder(b, out)
+    from nlbench.cli import compared as shown
+    from nlbench.comparison.compare import Asked, compared
+
+    found = compared(*folders, Asked(*numbers, "all" if everything else statistic))
+    failing = len(found.failing(two_sided))
+    if json:
+        output.as_json(shown.facts(found, GateError.exit_code if failing else 0))
+    elif markdown:
+        shown.markdown(found, two_sided)
+    else:
+        shown.show(found, two_sided)
+    if failing:
+        raise GateError(f"gate failed: {shown.verdict(found, two_sided)}")
+
+
+def _number(option: str, text: str) -> float:
+    """A number, or a percentage."""
+    try:
+        return float(text.removesuffix("%")) / 100 if text.endswith("%") else float(text)
+    except ValueError:
+        raise ConfigError(f"{option}: expected a number or a percentage such as 1%, got '{text}'") from None
+
+
+def _folder(where: Path, out: Path) -> Path:
+    """The folder itself, or that of the results of an experiment file."""
+    if where.is_dir() or not where.exists():
+        return where
+    folder = options.folder(options.experiment(where, None, None, None), out)
+    if not folder.is_dir():
+        first = options.command("run", where, None)
+        raise ConfigError(f"{where}: no results in {folder}; make them with: {first}")
+    return folder

@@ -1,0 +1,224 @@
+"""What `nlbench compare` prints: a table of changes, how sure they are, and the verdict; as text, Markdown or JSON."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+from nlbench.cli import output
+
+if TYPE_CHECKING:
+    from nlbench.comparison.compare import Compared
+
+MOST = 30  # comparisons without a significant change that are shown
+STYLES = {"FAILED": "red", "worse": "red", "changed": "red", "slight": "yellow", "better": "green"}
+QUIET = ("~", "few", "=")
+HEAD = ("", "t", "A", "B", "B/A", "p", "")
+LEGEND = {
+    "FAILED": "no number in B",
+    "worse": "by more than the margin",
+    "changed": "by more than the margin",
+    "slight": "significant, but not shown to exceed the margin",
+    "better": "by more than the margin",
+    "recovered": "no number in A",
+    "~": "not significant",
+    "few": "too few runs",
+    "=": "the same in both",
+}
+
+
+def facts(found: Compared, exit_code: int) -> dict[str, Any]:
+    """What `--json` prints."""
+    sides = {
+        name: {
+            "folder": str(side.path),
+            "experiment": side.experiment.experiment,
+            "hash": side.manifest["hash"],
+            "runs": side.runs,
+            "seed": side.seed,
+        }
+        for name, side in (("a", found.a), ("b", found.b))
+    }
+    return {
+        **sides,
+        "margin": found.asked.margin,
+        "alpha": found.asked.alpha,
+        "identical": found.identical,
+        "tests": found.tests,
+        "differences": list(found.notes),
+        "comparisons": found.table.to_dict(orient="records"),
+        "exit_code": exit_code,
+    }
+
+
+def verdict(found: Compared, two_sided: bool) -> str:
+    """The result in one line."""
+    failing = found.failing(two_sided)["verdict"].value_counts()
+    margin = _percent(found.asked.margin)
+    if len(failing):
+        counts = ", ".join(f"{count} {word}" for word, count in failing.items())
+        return f"{counts} of {len(found.table)} comparisons (margin {margin})"
+    if found.identical:
+        return f"equal: all {len(found.table)} comparisons, to the last bit"
+    if (found.table["verdict"] == "=").all():
+        return f"equal: all {len(found.table)} comparisons, but for rounding"
+    other = found.table["verdict"].value_counts()
+    parts = [f"{other[word]} {word}" for word in ("better", "recovered", "slight") if word in other]
+    return f"not worse by more than {margin}" + (f" ({', '.join(parts)})" if parts else "")
+
+
+def show(found: Compared, two_sided: bool) -> None:
+    """Print it within 80 columns."""
+    for name, side in (("A", found.a), ("B", found.b)):
+        print(f"{output.styled(name, 'bold')}  {side.path}\n   {_described(side)}")
+    for line in found.notes:
+        print(textwrap.fill(line, output.WIDTH, initial_indent="   ", subsequent_indent="     "))
+    print(f"\n{_how(found)}")
+    chosen, left = _chosen(found)
+    groups: dict[str, list[list[str]]] = {}
+    for row in chosen:
+        groups.setdefault(row["filter"], []).append(_cells(row, len(found.a.units) > 1))
+    lines = [list(HEAD), *(line for group in groups.values() for line in group)]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(HEAD))]
+    widths[0] = min(widths[0], output.WIDTH - 2 - sum(widths[1:]) - 2 * (len(HEAD) - 1))
+    print(f"\n{_line(lines[0], widths)}")
+    for label, group in groups.items():
+        print(_cut(label, output.WIDTH))
+        for cells in group:
+            print(_line(cells, widths))
+    if left:
+        print(f"... and {left} more without a significant change (--json has them)")
+    words = list(dict.fromkeys(row["verdict"] for row in chosen))
+    print()
+    output.definitions((word, LEGEND[word]) for word in words)
+    failed = len(found.failing(two_sided)) > 0
+    print(f"\n{output.styled(verdict(found, two_sided), 'red' if failed else 'green')}")
+    if line := _sensitivity(found):
+        print(line)
+    output.next_step(*_next(found, failed))
+
+
+def markdown(found: Compared, two_sided: bool) -> None:
+    """Print it as GitHub shows it."""
+    print(f"### nlbench compare: {verdict(found, two_sided)}\n")
+    for name, side in (("A", found.a), ("B", found.b)):
+        print(f"- {name}: `{side.path}`, {_described(side)}")
+    for line in found.notes:
+        print(f"- {_escaped(line)}")
+    chosen, left = _chosen(found)
+    print(
+        f"\n{_how(found)}\n\n| filter | statistic | t | A | B | B/A | p | |\n|---|---|---|---|---|---|---|---|"
+    )
+    for row in chosen:
+        cells = [row["filter"], *_cells(row, len(found.a.units) > 1)]
+        print(f"| {' | '.join(map(_escaped, cells))} |")
+    if left:
+        print(f"\n... and {left} more without a significant change")
+    if line := _sensitivity(found):
+        print(f"\n{line}")
+
+
+def _described(side: Any) -> str:
+    return f"{side.experiment.experiment}, {side.runs:,} runs, seed {side.seed}"
+
+
+def _how(found: Compared) -> str:
+    paired = found.table["paired"].sum()
+    if paired == 0:
+        how = "as independent runs" + (
+            " (one seed, but no runs kept)" if found.a.seed == found.b.seed else ""
+        )
+    else:
+        how = "on the same runs" if paired == len(found.table) else f"{paired} of them on the same runs"
+    level = _percent(found.asked.alpha)
+    text = f"{len(found.table)} comparisons, {how}; {found.tests} tests, Holm at {level}. "
+    text += f"Intervals: {_percent(1 - found.asked.alpha)}, each by itself."
+    return textwrap.fill(text, output.WIDTH)
+
+
+def _chosen(found: Compared) -> tuple[list[dict[str, Any]], int]:
+    """All with something to say, some of the others; and how many are left out."""
+    rows = found.table.to_dict(orient="records")
+    loud = [row for row in rows if row["verdict"] not in QUIET]
+    quiet = [row for row in rows if row["verdict"] in QUIET]
+    fit = max(MOST - len(loud), 0)
+    return loud + quiet[:fit], len(quiet[fit:])
+
+
+def _cells(row: dict[str, Any], several: bool) -> list[str]:
+    named = row["coordinate"] != "all" and several
+    what = f"{row['statistic']} {row['coordinate']}" if named else row["statistic"]
+    share = row["statistic"] == "diverged"
+    a, b = (f"{output.percent(row[side])} %" if share else _number(row[side]) for side in ("a", "b"))
+    time = row["time"] if row["time"] in ("any", "all") else f"{float(row['time']):g}"
+    return [what, time, a, b, _ratio(row), _p(row["p"]), row["verdict"]]
+
+
+def _percent(fraction: float) -> str:
+    """Of a number that was given: all its digits."""
+    return f"{100 * fraction:.10g} %"
+
+
+def _number(value: float) -> str:
+    return "none" if math.isnan(value) else f"{value:.4g}"
+
+
+def _ratio(row: dict[str, Any]) -> str:
+    if not math.isfinite(row["ratio"]):
+        return ""
+    if not (math.isfinite(row["low"]) and math.isfinite(row["high"])):
+        return f"{row['ratio']:.4g}"
+    reach = row["high"] - row["low"]
+    digits = 3 if reach == 0 else min(max(1 - math.floor(math.log10(reach)), 2), 5)
+    return f"{row['ratio']:.{digits}f} [{row['low']:.{digits}f}, {row['high']:.{digits}f}]"
+
+
+def _p(p: float) -> str:
+    if math.isnan(p):
+        return ""
+    return f"{p:.0e}" if p < 0.001 else f"{p:.3f}" if p < 0.1 else f"{p:.2f}"
+
+
+def _line(cells: list[str], widths: list[int]) -> str:
+    text = "  ".join(_cut(cell, width).ljust(width) for cell, width in zip(cells, widths, strict=True))
+    plain = f"  {text}".rstrip()
+    word = cells[-1]
+    return plain.removesuffix(word) + output.styled(word, STYLES[word]) if word in STYLES else plain
+
+
+def _sensitivity(found: Compared) -> str:
+    """What would have been found: a gate that cannot fail is worth nothing."""
+    sizes = found.table["statistic"].isin(["rms", "rms_clipped"]) & found.table["detects"].notna()
+    reach = found.table.loc[sizes, "detects"]
+    if reach.empty:
+        return ""
+    low, high = (f"{output.percent(value - 1)} %" for value in (reach.min(), reach.max()))
+    text = f"A change of an RMS error by {low if low == high else f'{low} to {high}'} would be found 9 times in 10."
+    return textwrap.fill(text, output.WIDTH)
+
+
+def _next(found: Compared, failed: bool) -> tuple[str, str]:
+    if failed:
+        return f"nlbench report {found.b.path}", "draws what is now; --json here has every comparison"
+    if found.identical:
+        return f"nlbench report {found.b.path}", "draws it"
+    return (
+        f"nlbench compare {found.a.path} {found.b.path} --all",
+        "compares every statistic, at the report times and over all times",
+    )
+
+
+def _cut(text: str, width: int) -> str:
+    return text if len(text) <= width else f"{text[: width - 1]}…"
+
+
+def _escaped(text: str) -> str:
+    """Of Markdown: what would end a cell or begin a tag."""
+    return (
+        text.replace("\\", "\\\\")
+        .replace("|", "\\|")
+        .replace("<", "&lt;")
+        .replace("~", "\\~")
+        .replace("*", "\\*")
+    )
