@@ -45,7 +45,7 @@ def quantities(
         for label in shared.labels
         for name in shared.coordinates
     }
-    for row in a.statistics.itertuples():
+    for row in a.tables["statistics"].itertuples():
         if row.filter not in shared.labels or row.coordinate not in coordinates or row.statistic == DIVERGED:
             continue
         if row.time == ALL:

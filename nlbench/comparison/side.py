@@ -42,8 +42,8 @@ class Side:
         self.runs, self.seed = int(self.manifest["runs"]), int(self.manifest["seed"])
         self.units: dict[str, str] = self.manifest["units"]
         self.clip = {name: math.inf if most is None else most for name, most in self.manifest["clip"].items()}
-        self.statistics: pd.DataFrame = tables["statistics"]
-        self._tables = Tables(self.statistics, tables["paired"])
+        self.tables = tables
+        self._lookup = Tables(tables["statistics"], tables["paired"])
         self.kept = KeptTable(tables["runs"], self.clip, self.manifest["norms"])
         self._divergence = tables["divergence"].set_index("filter")
 
@@ -78,7 +78,7 @@ class Side:
 
     def has(self, quantity: Quantity) -> bool:
         """Whether the table of statistics has it, be it NaN."""
-        return self._tables.known(quantity) is not UNKNOWN
+        return self._lookup.known(quantity) is not UNKNOWN
 
     def per_run(self, quantity: Quantity) -> PerRun | None:
         """What enters a statistic, of every kept run."""
@@ -106,7 +106,7 @@ class Side:
             degrees = effective_degrees(influence)
             if self.all_kept:
                 return Estimate(value, standard_error(influence), count, degrees)
-        known = self._tables.known(quantity)
+        known = self._lookup.known(quantity)
         groups: float = min(GROUPS, math.ceil(self.runs / int(self.manifest["block"]))) - 1
         if own is not None and count > 1:
             exact = degrees * known.n / count
