@@ -66,7 +66,7 @@ def compare(
     numbers = _number("--margin", margin), _number("--alpha", alpha)
     folders = _folder(a, out), _folder(b, out)
     from nlbench.cli import compared as shown
-    from nlbench.comparison.compare import Asked, compared
+    from nlbench.comparison.compared import Asked, compared
 
     found = compared(*folders, Asked(*numbers, "all" if everything else statistic))
     failing = len(found.failing(two_sided))

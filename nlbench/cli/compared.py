@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from nlbench.cli import output
 
 if TYPE_CHECKING:
-    from nlbench.comparison.compare import Compared
+    from nlbench.comparison.compared import Compared
 
 MOST = 30  # comparisons without a significant change that are shown
 STYLES = {"FAILED": "red", "worse": "red", "changed": "red", "slight": "yellow", "better": "green"}

@@ -37,6 +37,6 @@ def compare(
     `nlbench.comparison.verdicts`.
     Raises `DamagedResults`, `ConfigError` for an unknown statistic, `NothingCompared`.
     """
-    from nlbench.comparison.compare import Asked, compared
+    from nlbench.comparison.compared import Asked, compared
 
     return compared(a, b, Asked(margin, alpha, statistics)).table

@@ -1,4 +1,4 @@
-"""Claims: from the kept runs come the same values and standard errors as in the engine's tables, which are made of sums."""
+"""Claims: kept runs give the same values and standard errors as the tables, which are made of sums."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_values_and_standard_errors_are_those_of_the_table(made):
 
 
 def test_differences_of_influences_give_the_standard_errors_of_the_paired_table(made):
-    layout, totals, kept = made
+    _, totals, kept = made
     rows = paired_table(totals)
     assert len(rows)
     for row in rows.itertuples():

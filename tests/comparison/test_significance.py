@@ -1,4 +1,4 @@
-"""Claims: p-values are those of exact enumeration and of printed tables; a true change at the margin is seldom beyond it."""
+"""Claims: p-values are those of enumeration and of printed tables; a change as large as the margin is not beyond it."""
 
 from __future__ import annotations
 
