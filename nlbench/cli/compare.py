@@ -90,7 +90,9 @@ def _number(option: str, text: str) -> float:
 
 def _folder(where: Path, out: Path) -> Path:
     """The folder itself, or that of the results of an experiment file."""
-    if where.is_dir() or not where.exists():
+    if not where.exists():
+        raise ConfigError(f"{where}: no such folder of a run, and no such experiment file")
+    if where.is_dir():
         return where
     folder = options.folder(options.experiment(where, None, None, None), out)
     if not folder.is_dir():

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 MOST = 30  # comparisons without a significant change that are shown
 STYLES = {"FAILED": "red", "worse": "red", "changed": "red", "slight": "yellow", "better": "green"}
+SHORT = {"rms_clipped": "clipped"}  # beside the name of a coordinate
 QUIET = ("~", "few", "=")
 HEAD = ("", "t", "A", "B", "B/A", "p", "")
 LEGEND = {
@@ -91,7 +92,10 @@ def show(found: Compared, two_sided: bool) -> None:
         print(f"... and {left} more without a significant change (--json has them)")
     words = list(dict.fromkeys(row["verdict"] for row in chosen))
     print()
-    output.definitions((word, LEGEND[word]) for word in words)
+    short = [
+        (SHORT[name], f"{name}, which counts diverged runs") for name in SHORT if _shortened(found, name)
+    ]
+    output.definitions([*short, *((word, LEGEND[word]) for word in words)])
     failed = len(found.failing(two_sided)) > 0
     print(f"\n{output.styled(verdict(found, two_sided), 'red' if failed else 'green')}")
     if line := _sensitivity(found):
@@ -130,7 +134,7 @@ def _how(found: Compared) -> str:
             " (one seed, but no runs kept)" if found.a.seed == found.b.seed else ""
         )
     else:
-        how = "on the same runs" if paired == len(found.table) else f"{paired} of them on the same runs"
+        how = "run by run" if paired == len(found.table) else f"{paired} of them run by run"
     level = _percent(found.asked.alpha)
     text = f"{len(found.table)} comparisons, {how}; {found.tests} tests, Holm at {level}. "
     text += f"Intervals: {_percent(1 - found.asked.alpha)}, each by itself."
@@ -148,7 +152,8 @@ def _chosen(found: Compared) -> tuple[list[dict[str, Any]], int]:
 
 def _cells(row: dict[str, Any], several: bool) -> list[str]:
     named = row["coordinate"] != "all" and several
-    what = f"{row['statistic']} {row['coordinate']}" if named else row["statistic"]
+    name = SHORT.get(row["statistic"], row["statistic"])
+    what = f"{name} {row['coordinate']}" if named else row["statistic"]
     share = row["statistic"] == "diverged"
     a, b = (f"{output.percent(row[side])} %" if share else _number(row[side]) for side in ("a", "b"))
     time = row["time"] if row["time"] in ("any", "all") else f"{float(row['time']):g}"
@@ -158,6 +163,10 @@ def _cells(row: dict[str, Any], several: bool) -> list[str]:
 def _percent(fraction: float) -> str:
     """Of a number that was given: all its digits."""
     return f"{100 * fraction:.10g} %"
+
+
+def _shortened(found: Compared, statistic: str) -> bool:
+    return len(found.a.units) > 1 and statistic in set(found.table["statistic"])
 
 
 def _number(value: float) -> str:
@@ -177,6 +186,8 @@ def _ratio(row: dict[str, Any]) -> str:
 def _p(p: float) -> str:
     if math.isnan(p):
         return ""
+    if p < 1e-99:
+        return "<1e-99"
     return f"{p:.0e}" if p < 0.001 else f"{p:.3f}" if p < 0.1 else f"{p:.2f}"
 
 

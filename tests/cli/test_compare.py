@@ -113,7 +113,7 @@ def test_an_experiments_folder_with_one_run_stands_for_it(tmp_path, folder):
     assert "holds 2 runs, name one" in two.stderr
     (tmp_path / "empty").mkdir()
     assert "holds no run" in compare(tmp_path / "empty", a).stderr
-    assert "no such folder" in compare(tmp_path / "none", a).stderr
+    assert "none: no such folder of a run" in compare(tmp_path / "none", a).stderr
 
 
 def test_an_unfinished_run_is_not_compared(folder):

@@ -48,6 +48,8 @@ def python(*arguments: str) -> subprocess.CompletedProcess[str]:
         (["run", "none.yaml"], 2),
         (["plan", "bad.yaml"], 2),
         (["replay", "good.yaml", "--filter", "none", "--trajectory", "0"], 2),
+        (["compare", "--help"], 0),
+        (["compare", "none", "none"], 2),
         (["filter", "--help"], 0),
         (["filter", "good.yaml", "bad.yaml"], 2),
         (["filter", "bad.yaml", "none.csv"], 2),
