@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from typing import TYPE_CHECKING, Any
 
 from nlbench.cli import output
+from nlbench.cli.changes import HEAD, SHORT, cells, percent
 
 if TYPE_CHECKING:
     from nlbench.comparison.compared import Compared
 
 MOST = 30  # comparisons without a significant change that are shown
 STYLES = {"FAILED": "red", "worse": "red", "changed": "red", "slight": "yellow", "better": "green"}
-SHORT = {"rms_clipped": "clipped"}  # beside the name of a coordinate
 QUIET = ("~", "few", "=")
-HEAD = ("", "t", "A", "B", "B/A", "p", "")
 LEGEND = {
     "FAILED": "no number in B",
     "worse": "by more than the margin",
@@ -56,7 +54,7 @@ def facts(found: Compared, exit_code: int) -> dict[str, Any]:
 def verdict(found: Compared, two_sided: bool) -> str:
     """The result in one line."""
     failing = found.failing(two_sided)["verdict"].value_counts()
-    margin = _percent(found.asked.margin)
+    margin = percent(found.asked.margin)
     if len(failing):
         counts = ", ".join(f"{count} {word}" for word, count in failing.items())
         return f"{counts} of {len(found.table)} comparisons (margin {margin})"
@@ -76,31 +74,37 @@ def show(found: Compared, two_sided: bool) -> None:
     for line in found.notes:
         print(textwrap.fill(line, output.WIDTH, initial_indent="   ", subsequent_indent="     "))
     print(f"\n{_how(found)}")
-    chosen, left = _chosen(found)
-    groups: dict[str, list[list[str]]] = {}
-    for row in chosen:
-        groups.setdefault(row["filter"], []).append(_cells(row, len(found.a.units) > 1))
-    lines = [list(HEAD), *(line for group in groups.values() for line in group)]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(HEAD))]
-    widths[0] = min(widths[0], output.WIDTH - 2 - sum(widths[1:]) - 2 * (len(HEAD) - 1))
-    print(f"\n{_line(lines[0], widths)}")
-    for label, group in groups.items():
-        print(_cut(label, output.WIDTH))
-        for cells in group:
-            print(_line(cells, widths))
-    if left:
-        print(f"... and {left} more without a significant change (--json has them)")
-    words = list(dict.fromkeys(row["verdict"] for row in chosen))
-    print()
-    short = [
-        (SHORT[name], f"{name}, which counts diverged runs") for name in SHORT if _shortened(found, name)
-    ]
-    output.definitions([*short, *((word, LEGEND[word]) for word in words)])
+    if not (found.table["verdict"] == "=").all():
+        _table(found)
     failed = len(found.failing(two_sided)) > 0
     print(f"\n{output.styled(verdict(found, two_sided), 'red' if failed else 'green')}")
     if line := _sensitivity(found):
         print(line)
     output.next_step(*_next(found, failed))
+
+
+def _table(found: Compared) -> None:
+    """The changes, by filter, and what the words beside them mean."""
+    chosen, left = _chosen(found)
+    groups: dict[str, list[list[str]]] = {}
+    for row in chosen:
+        groups.setdefault(row["filter"], []).append(cells(row, len(found.a.units) > 1))
+    lines = [list(HEAD), *(each for group in groups.values() for each in group)]
+    widths = [max(len(each[column]) for each in lines) for column in range(len(HEAD))]
+    widths[0] = min(widths[0], output.WIDTH - 2 - sum(widths[1:]) - 2 * (len(HEAD) - 1))
+    print(f"\n{_line(lines[0], widths)}")
+    for label, group in groups.items():
+        print(_cut(label, output.WIDTH))
+        for each in group:
+            print(_line(each, widths))
+    if left:
+        print(f"... and {left} more without a significant change (--json has them)")
+    print()
+    short = [
+        (SHORT[name], f"{name}, which counts diverged runs") for name in SHORT if _shortened(found, name)
+    ]
+    words = dict.fromkeys(row["verdict"] for row in chosen)
+    output.definitions([*short, *((word, LEGEND[word]) for word in words)])
 
 
 def markdown(found: Compared, two_sided: bool) -> None:
@@ -115,8 +119,8 @@ def markdown(found: Compared, two_sided: bool) -> None:
         f"\n{_how(found)}\n\n| filter | statistic | t | A | B | B/A | p | |\n|---|---|---|---|---|---|---|---|"
     )
     for row in chosen:
-        cells = [row["filter"], *_cells(row, len(found.a.units) > 1)]
-        print(f"| {' | '.join(map(_escaped, cells))} |")
+        shown = [row["filter"], *cells(row, len(found.a.units) > 1)]
+        print(f"| {' | '.join(map(_escaped, shown))} |")
     if left:
         print(f"\n... and {left} more without a significant change")
     if line := _sensitivity(found):
@@ -135,9 +139,9 @@ def _how(found: Compared) -> str:
         )
     else:
         how = "run by run" if paired == len(found.table) else f"{paired} of them run by run"
-    level = _percent(found.asked.alpha)
+    level = percent(found.asked.alpha)
     text = f"{len(found.table)} comparisons, {how}; {found.tests} tests, Holm at {level}. "
-    text += f"Intervals: {_percent(1 - found.asked.alpha)}, each by itself."
+    text += f"Intervals: {percent(1 - found.asked.alpha)}, each by itself."
     return textwrap.fill(text, output.WIDTH)
 
 
@@ -150,51 +154,14 @@ def _chosen(found: Compared) -> tuple[list[dict[str, Any]], int]:
     return loud + quiet[:fit], len(quiet[fit:])
 
 
-def _cells(row: dict[str, Any], several: bool) -> list[str]:
-    named = row["coordinate"] != "all" and several
-    name = SHORT.get(row["statistic"], row["statistic"])
-    what = f"{name} {row['coordinate']}" if named else row["statistic"]
-    share = row["statistic"] == "diverged"
-    a, b = (f"{output.percent(row[side])} %" if share else _number(row[side]) for side in ("a", "b"))
-    time = row["time"] if row["time"] in ("any", "all") else f"{float(row['time']):g}"
-    return [what, time, a, b, _ratio(row), _p(row["p"]), row["verdict"]]
-
-
-def _percent(fraction: float) -> str:
-    """Of a number that was given: all its digits."""
-    return f"{100 * fraction:.10g} %"
-
-
 def _shortened(found: Compared, statistic: str) -> bool:
     return len(found.a.units) > 1 and statistic in set(found.table["statistic"])
 
 
-def _number(value: float) -> str:
-    return "none" if math.isnan(value) else f"{value:.4g}"
-
-
-def _ratio(row: dict[str, Any]) -> str:
-    if not math.isfinite(row["ratio"]):
-        return ""
-    if not (math.isfinite(row["low"]) and math.isfinite(row["high"])):
-        return f"{row['ratio']:.4g}"
-    reach = row["high"] - row["low"]
-    digits = 3 if reach == 0 else min(max(1 - math.floor(math.log10(reach)), 2), 5)
-    return f"{row['ratio']:.{digits}f} [{row['low']:.{digits}f}, {row['high']:.{digits}f}]"
-
-
-def _p(p: float) -> str:
-    if math.isnan(p):
-        return ""
-    if p < 1e-99:
-        return "<1e-99"
-    return f"{p:.0e}" if p < 0.001 else f"{p:.3f}" if p < 0.1 else f"{p:.2f}"
-
-
-def _line(cells: list[str], widths: list[int]) -> str:
-    text = "  ".join(_cut(cell, width).ljust(width) for cell, width in zip(cells, widths, strict=True))
+def _line(given: list[str], widths: list[int]) -> str:
+    text = "  ".join(_cut(cell, width).ljust(width) for cell, width in zip(given, widths, strict=True))
     plain = f"  {text}".rstrip()
-    word = cells[-1]
+    word = given[-1]
     return plain.removesuffix(word) + output.styled(word, STYLES[word]) if word in STYLES else plain
 
 

@@ -3,34 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import pandas as pd
 
-from nlbench.comparison.change import ANY, LEAST_RUNS, Measured, diverged, measured
+from nlbench.comparison.change import ANY, LEAST_RUNS, Measured, measured
 from nlbench.comparison.common import Common, common
+from nlbench.comparison.fractions import diverged
 from nlbench.comparison.quantities import ALL, DIVERGED, checked, quantities
 from nlbench.comparison.side import Side, opened
-from nlbench.comparison.significance import holm
-from nlbench.comparison.verdicts import EITHER_WAY, FAILING, ORDER, missing, verdict
+from nlbench.comparison.table import Asked, table
+from nlbench.comparison.verdicts import EITHER_WAY, FAILING, missing
 from nlbench.errors import ConfigError, NothingCompared
 from nlbench.results.results import Results
 from nlbench.statistics.comparisons import Quantity
-
-COLUMNS = (
-    *("filter", "time", "coordinate", "statistic", "a", "b", "ratio", "low", "high", "n_a", "n_b", "paired"),
-    *("p", "p_margin", "detects", "verdict"),
-)
-
-
-class Asked(NamedTuple):
-    """What to compare, and how; see `nlbench.compare`."""
-
-    margin: float
-    alpha: float
-    statistics: Sequence[str] | str | None = None
 
 
 class Compared(NamedTuple):
@@ -64,7 +52,8 @@ def compared_sides(first: Side, second: Side, asked: Asked) -> Compared:
     shared = common(first, second)
     rows = list(_measured(first, second, shared, names, asked.statistics == ALL))
     tested = [row for row in rows if row.testable and not missing(row)]
-    if not any(row.testable or row.same or missing(row) for row in rows):
+    # Fractions without any diverged run are the same whatever the number of runs: they alone are no comparison.
+    if not rows or not (tested or any(map(missing, rows)) or all(row.same for row in rows)):
         what = "all statistics" if names is None else ", ".join(names)
         raise NothingCompared(
             f"nothing was compared: {what} of {', '.join(shared.labels)} at t = "
@@ -73,7 +62,7 @@ def compared_sides(first: Side, second: Side, asked: Asked) -> Compared:
         )
     notes = (*shared.notes, *_lost_in_both(first, second, shared))
     identical = first.checksums == second.checksums
-    return Compared(first, second, asked, _table(rows, tested, asked), len(tested), notes, identical)
+    return Compared(first, second, asked, table(rows, tested, asked), len(tested), notes, identical)
 
 
 def _valid(asked: Asked) -> tuple[str, ...] | None:
@@ -121,47 +110,3 @@ def _lost_in_both(a: Side, b: Side, shared: Common) -> Iterator[str]:
     both = [label for label in shared.labels if a.failed(label) and b.failed(label)]
     if both:
         yield f"failed in both, so not compared: {', '.join(both)}"
-
-
-def _table(rows: list[Measured], tested: list[Measured], asked: Asked) -> pd.DataFrame:
-    count = max(len(tested), 1)
-    p = holm([_p(row, 0.0) for row in tested])
-    p_margin = holm([_p(row, asked.margin) for row in tested])
-    of = {id(row): (float(p[i]), float(p_margin[i])) for i, row in enumerate(tested)}
-    made = []
-    for row in rows:
-        own = of.get(id(row), (math.nan, math.nan))
-        word = verdict(row, own[0] <= asked.alpha, own[1] <= asked.alpha)
-        q = row.quantity
-        made.append(
-            (q.filter, str(q.time), q.coordinate, q.statistic, row.a, row.b, *_interval(row, asked.alpha))
-            + (row.n_a, row.n_b, row.paired, *own, _detects(row, asked, count), word)
-        )
-    table = pd.DataFrame(made, columns=COLUMNS)
-    rank = table["verdict"].map(ORDER.index)
-    order = pd.DataFrame({"rank": rank, "p": table["p_margin"].fillna(-1), "ratio": -table["ratio"]})
-    return table.loc[order.sort_values(["rank", "p", "ratio"], kind="stable").index].reset_index(drop=True)
-
-
-def _p(row: Measured, margin: float) -> float:
-    """Of a change beyond the margin. Fractions of diverged runs are tested for equality; beyond the margin is one whose
-    ratio is."""
-    if row.change is not None:
-        return row.change.p_beyond(row.slack(margin))
-    low, high = sorted((row.a, row.b))
-    return row.p if high > (1 + margin) * low else 1.0
-
-
-def _interval(row: Measured, alpha: float) -> tuple[float, float, float]:
-    if row.change is None:
-        return (row.b / row.a if row.a else math.nan if row.b == 0 else math.inf), math.nan, math.nan
-    if not row.testable and not row.same:
-        return row.ratio(row.change.effect), math.nan, math.nan
-    low, high = row.change.interval(alpha)
-    return row.ratio(row.change.effect), row.ratio(low), row.ratio(high)
-
-
-def _detects(row: Measured, asked: Asked, count: int) -> float:
-    if row.change is None or not row.testable:
-        return math.nan
-    return row.ratio(row.change.detects(row.slack(asked.margin), asked.alpha / count))

@@ -34,6 +34,7 @@ def test_a_run_and_itself_are_equal(folder):
     done = compare(a, a)
     assert done.exit_code == 0
     assert "equal: all 9 comparisons, to the last bit" in done.stdout
+    assert "B/A" not in done.stdout
 
 
 def test_a_change_of_three_percent_fails(folder):
@@ -63,6 +64,22 @@ def test_margins_are_numbers_or_percentages(folder):
     assert wrong.exit_code == 2
     assert "--margin: expected a number or a percentage such as 1%, got 'much'" in wrong.stderr
     assert compare(a, b, "--alpha", "0").exit_code == 2
+
+
+def test_long_names_of_filters_and_coordinates_stay_within_eighty_columns(tmp_path, folder, monkeypatch):
+    long = "a filter with a label that is much longer than anybody would wish for, and then some more"
+    names = {"units": {"x": "m", "y": "m"}}
+    sides = [made.side(ERROR * scale, 1, **names) for scale in (1.0, 1.03)]
+    for number, side in enumerate(sides):
+        for table in side.tables.values():
+            for column in {"filter", "coordinate"} & set(table):
+                table[column] = table[column].replace({"f1": long[:64]})
+        made.folder(tmp_path / str(number), side)
+    monkeypatch.chdir(tmp_path)
+    done = compare("0", "1")
+    assert done.exit_code == 3
+    assert long[:64] in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= 80
 
 
 def test_json_has_everything(folder):

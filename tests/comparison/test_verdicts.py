@@ -68,6 +68,18 @@ def test_fewer_runs_of_the_same_seed_are_compared_on_those_that_both_have():
     assert set(table["n_a"]) == set(table["n_b"]) == {300}
 
 
+def test_errors_without_a_clip_are_compared_on_the_runs_that_neither_has_lost():
+    lost = np.zeros(ERROR.shape, bool)
+    lost[0, :, :100] = True
+    a = made.side(ERROR, 1, clip={"x": None})
+    b = made.side(np.where(lost, 1e6, ERROR), 1, lost, clip={"x": None})
+    for first, second in ((a, b), (b, a)):
+        table = compared_sides(first, second, USUAL).table
+        rms = table[(table["filter"] == "f1") & (table["statistic"] == "rms")]
+        assert set(rms["verdict"]) == {"="}
+        assert set(rms["n_a"]) == set(rms["n_b"]) == {900}
+
+
 def test_where_few_runs_are_kept_the_tables_are_used_if_they_say_more():
     many = made.errors(3, 20_000, filters=1)
     other = made.errors(4, 20_000, filters=1)
@@ -178,8 +190,9 @@ def test_nothing_in_common_says_what_each_has():
 
 def test_too_few_runs_are_nothing_compared():
     few = [made.side(ERROR[..., i : i + 20], i) for i in (0, 500)]
-    with pytest.raises(NothingCompared, match="fewer than 30 runs"):
-        verdicts(*few, Asked(0.01, 0.01, "rms"))
+    for asked in (USUAL, Asked(0.01, 0.01, "rms")):
+        with pytest.raises(NothingCompared, match="fewer than 30 runs"):
+            verdicts(*few, asked)
 
 
 def test_the_public_function_gives_the_table(tmp_path):
