@@ -7,8 +7,12 @@ import pandas as pd
 import pytest
 
 import nlbench as nb
+from nlbench.comparison.change import Measured
 from nlbench.comparison.compared import Asked, compared_sides
+from nlbench.comparison.significance import Change
+from nlbench.comparison.verdicts import verdict
 from nlbench.errors import ConfigError, NothingCompared
+from nlbench.statistics.comparisons import Quantity
 from tests.comparison import made
 
 ERROR = made.errors(1, 1000)
@@ -54,6 +58,43 @@ def test_worse_better_and_slight_changes_are_told_apart():
     assert worst["ratio"] == pytest.approx(1.03, abs=2e-4)
     assert worst["low"] < worst["ratio"] < worst["high"]
     assert bool(worst["paired"])
+
+
+@pytest.mark.parametrize(
+    ("statistic", "risen", "fallen"),
+    [
+        ("rms_run_mean", "worse", "better"),
+        ("diverged", "worse", "better"),
+        ("log_likelihood", "better", "worse"),
+        ("nees", "changed", "changed"),
+    ],
+)
+def test_the_direction_decides(statistic, risen, fallen):
+    quantity = Quantity("f", 1.0, "all", statistic)
+    for b, said in ((-1.5, risen), (-2.5, fallen)):
+        row = Measured(quantity, -2.0, b, 100, 100, False, Change(0.25, 0.01, 99.0))
+        assert verdict(row, significant=True, beyond=True) == said
+        assert verdict(row, significant=True, beyond=False) == "slight"
+        assert verdict(row, significant=False, beyond=False) == "~"
+
+
+def test_fractions_of_diverged_runs_within_the_margin_pass():
+    lost = np.zeros((2, *ERROR.shape), bool)
+    lost[0, :, :, :500], lost[1, :, :, 10:550] = True, True
+    a, b = (made.side(ERROR, 1, each) for each in lost)
+    for margin, said in ((0.01, "worse"), (0.1, "slight")):
+        table = compared_sides(a, b, Asked(margin, 0.01)).table
+        assert set(table.loc[table["statistic"] == "diverged", "verdict"]) == {said}
+
+
+def test_fractions_at_other_report_times_are_of_the_common_ones():
+    lost = np.zeros(ERROR.shape, bool)
+    lost[:, 0, :50] = True  # at the first time only, which the other run does not have
+    a = made.side(ERROR, 1, lost)
+    b = made.side(ERROR, 2, np.zeros(ERROR.shape, bool), times=(1.5, 2.0))
+    table = compared_sides(a, b, USUAL).table
+    fractions = table[table["statistic"] == "diverged"]
+    assert set(fractions["a"]) == set(fractions["b"]) == {0.0}
 
 
 def test_a_larger_margin_lets_more_pass():
