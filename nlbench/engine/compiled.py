@@ -36,7 +36,8 @@ class Compiled(NamedTuple):
         """Sums of blocks first_block ... first_block + count - 1, on the host."""
         chunk = make_chunk(self.problem, first_block, count, CAPACITY, runs)
         sums, _ = self.executable(self.seed, chunk)
-        return {name: np.asarray(value)[:count] for name, value in sums.items()}
+        # Copied, so that sums that wait to be added do not keep arrays of the full capacity.
+        return {name: np.asarray(value)[:count].copy() for name, value in sums.items()}
 
     def view(self, trajectory: int) -> View:
         """One trajectory in full, computed with its block by the same executable."""

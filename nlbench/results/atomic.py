@@ -12,7 +12,7 @@ from nlbench.errors import EnvironmentFault
 _SUFFIX = ".partial"
 
 
-def atomic_write(path: Path, data: bytes) -> None:
+def atomic_write(path: Path, data: bytes | memoryview) -> None:
     """Write `data` to `path`: into a file beside it, to the disk, then renamed over `path`.
 
     The folder is made if need be. Raises `EnvironmentFault` and leaves `path` as it was when the disk is full

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nlbench.errors import DamagedResults
 from nlbench.results import checksum
-from nlbench.results.folder import EXPERIMENT, MANIFEST, TABLES
+from nlbench.results.folder import DONE, EXPERIMENT, MANIFEST, TABLES, RunFolder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,12 +58,29 @@ class Results:
     def damaged(self) -> list[str]:
         """What is wrong with each file that is missing or was changed since the run wrote it."""
         found = []
-        for name in self.manifest["checksums"]:
+        try:
+            names = list(self.manifest["checksums"])
+        except DamagedResults as error:
+            return [str(error)]
+        checks: list[Callable[[], object]] = [self.check_done]
+        for check in (*checks, *(partial(self._checked, name) for name in names)):
             try:
-                self._checked(name)
+                check()
             except DamagedResults as error:
                 found.append(str(error))
         return found
+
+    def check_done(self) -> None:
+        """Raise `DamagedResults` where the mark that the run is done does not say what a sound manifest says."""
+        done = RunFolder(self.path).done_runs()
+        try:
+            runs = self.manifest["runs"]
+        except DamagedResults:
+            return
+        if done is not None and done != runs:
+            raise DamagedResults(
+                f"{self.path / DONE}: says {done:,} runs, the manifest {runs:,}; it was edited"
+            )
 
     def _checked(self, name: str) -> bytes:
         path = self.path / name
