@@ -26,11 +26,12 @@ def run(
 
     What was computed before is kept: a larger --runs tops up, the same command after an interruption goes on.
     """
-    experiment = options.experiment(config, runs, seed, settings)
-    if gate and not experiment.claims:
-        raise ConfigError(f"{config}: --gate needs claims, and the file makes none")
-    results = _computed(experiment, out, quiet=json)
-    report = _reported(results)
+    with output.errors_as_json(json):
+        experiment = options.experiment(config, runs, seed, settings)
+        if gate and not experiment.claims:
+            raise ConfigError(f"{config}: --gate needs claims, and the file makes none")
+        results = _computed(experiment, out, quiet=json)
+        report = _reported(results)
     from nlbench.cli import summary
 
     facts = summary.facts(experiment, results, report)
@@ -49,12 +50,12 @@ def run(
 def _computed(experiment: Any, out: Path, quiet: bool) -> Any:
     from nlbench import runtime
     from nlbench.cli.progress import progress
-    from nlbench.cli.signals import terminated_like_interrupted
+    from nlbench.cli.signals import ended_by_a_second, terminated_like_interrupted
 
     runtime.configure(precision=experiment.engine.precision, threads=experiment.engine.threads)
     from nlbench import engine
 
-    with terminated_like_interrupted(), progress(quiet) as show:
+    with terminated_like_interrupted(), ended_by_a_second(), progress(quiet) as show:
         return engine.run(experiment, out, progress=show)
 
 

@@ -49,6 +49,11 @@ def sweep(folder: Path) -> None:
         remove(left)
 
 
+def is_partial(path: Path) -> bool:
+    """Whether a file is one that was being written, and is swept before anything else is."""
+    return path.name.startswith(".") and path.suffix == _SUFFIX
+
+
 def write_fault(path: Path, error: OSError, needed: int | None = None) -> EnvironmentFault:
     """The error to raise when `path` could not be written: why, what was needed, what is free."""
     parts = [f"cannot write {path}: {error.strerror or error}"]

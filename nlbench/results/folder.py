@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
 
-CHECKPOINT = "batches/checkpoint.npz"
+BATCHES = "batches"
+CHECKPOINT = f"{BATCHES}/checkpoint.npz"
 EXPERIMENT = "config.resolved.yaml"
 MANIFEST = "manifest.json"
 TABLES = "tables"
@@ -45,7 +46,7 @@ class RunFolder:
 
     def _hold(self) -> None:
         self._held = self._holding.enter_context(lock.exclusive(self.path / LOCK))
-        for folder in (self.path, *(self.path / name for name in ("batches", TABLES, "figures"))):
+        for folder in (self.path, *(self.path / name for name in (BATCHES, TABLES, "figures"))):
             sweep(folder)
 
     def _removed(self) -> bool:

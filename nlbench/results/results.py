@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from nlbench.errors import DamagedResults
 from nlbench.results import checksum
-from nlbench.results.folder import DONE, EXPERIMENT, MANIFEST, TABLES, RunFolder
+from nlbench.results.atomic import is_partial
+from nlbench.results.folder import BATCHES, DONE, EXPERIMENT, MANIFEST, TABLES, RunFolder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,12 +64,24 @@ class Results:
         except DamagedResults as error:
             return [str(error)]
         checks: list[Callable[[], object]] = [self.check_done]
-        for check in (*checks, *(partial(self._checked, name) for name in names)):
+        checks += [partial(self._checked, name) for name in names]
+        for check in checks:
             try:
                 check()
             except DamagedResults as error:
                 found.append(str(error))
         return found
+
+    def unknown(self) -> list[str]:
+        """Files among the tables and batches that the run did not write."""
+        found = sorted(path for folder in (BATCHES, TABLES) for path in (self.path / folder).rglob("*"))
+        names = {str(path.relative_to(self.path)): path for path in found if path.is_file()}
+        known = self.manifest["checksums"]
+        return [
+            f"{path}: the run did not write this file; remove it"
+            for name, path in names.items()
+            if name not in known and not is_partial(path)
+        ]
 
     def check_done(self) -> None:
         """Raise `DamagedResults` where the mark that the run is done does not say what a sound manifest says."""
