@@ -25,7 +25,7 @@ class Held(NamedTuple):
         """Whether the file at the path still is the one that is held: not where the folder was removed or replaced."""
         try:
             return os.path.samestat(os.fstat(self.file.fileno()), self.path.stat())
-        except OSError:
+        except (OSError, ValueError):  # a file that is closed
             return False
 
 
