@@ -41,7 +41,7 @@ def verify(results: Any, block: int | None = None) -> Any:
     results: `Results` or the folder of a run. block: its number; a random one unless said. Returns a `Verified`, whose
     `faults` is empty where nothing is wrong; writes nothing.
     """
-    from nlbench.engine.verify import verify
+    from nlbench.engine.verification import verify
     from nlbench.results.results import Results
 
     return verify(results if isinstance(results, Results) else Results(results), block)
