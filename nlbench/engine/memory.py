@@ -36,9 +36,13 @@ class Load(NamedTuple):
 
 
 def ran_out(error: BaseException) -> bool:
-    """Whether an error says that memory ran out: Python's and NumPy's own, or XLA's, which has a status in its text."""
-    return isinstance(error, MemoryError) or (
-        type(error).__name__ in ("JaxRuntimeError", "XlaRuntimeError") and "RESOURCE_EXHAUSTED" in str(error)
+    """Whether an error says that memory ran out: Python's, NumPy's and Arrow's own, XLA's, which has a status in its
+    text, or that of a thread for whose stack there is no room."""
+    said = str(error)
+    return (
+        isinstance(error, MemoryError)
+        or (type(error).__name__ in ("JaxRuntimeError", "XlaRuntimeError") and "RESOURCE_EXHAUSTED" in said)
+        or (isinstance(error, RuntimeError) and said == "can't start new thread")
     )
 
 

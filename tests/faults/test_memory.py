@@ -19,6 +19,7 @@ from tests.small_runs import table_bytes
 
 pytestmark = pytest.mark.usefixtures("quick")
 OURS = MemoryError("Unable to allocate 1.2 GiB for an array")
+NO_ROOM_FOR_A_STACK = RuntimeError("can't start new thread")
 XLAS = jax.errors.JaxRuntimeError("RESOURCE_EXHAUSTED: Out of memory allocating 1288490188 bytes.")
 
 
@@ -55,7 +56,7 @@ def scarce(program, monkeypatch):
     return made
 
 
-@pytest.mark.parametrize("error", [OURS, XLAS], ids=["numpy", "xla"])
+@pytest.mark.parametrize("error", [OURS, XLAS, NO_ROOM_FOR_A_STACK], ids=["numpy", "xla", "threads"])
 def test_less_at_a_time_gives_the_same_bytes(undisturbed, scarce, tmp_path, caplog, error):
     memory = scarce(1, error)
     with caplog.at_level(logging.WARNING, logger="nlbench"):
