@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from nlbench.cli import compare, filter, listing, output, perf, preview, reproduce, run, saved
+from nlbench.cli import compare, filter, listing, output, perf, preview, reproduce, run, saved, verify
 from nlbench.errors import EnvironmentFault, Interrupted, NlbenchError
 
 HELP = """Monte Carlo benchmarks of nonlinear filters.
@@ -110,6 +110,7 @@ app.command("plan")(preview.plan)
 app.command("list")(listing.show)
 app.command("report")(saved.report)
 app.command("replay")(saved.replay)
+app.command("verify")(verify.verify)
 app.command("reproduce")(reproduce.reproduce)
 app.command("compare")(compare.compare)
 app.command("filter")(filter.filter_recorded)

@@ -12,6 +12,12 @@ if TYPE_CHECKING:
     from nlbench.config.precision import Precision as PrecisionAsked
 
 Config = Annotated[Path, typer.Argument(metavar="CONFIG", help="Experiment file (YAML).", show_default=False)]
+Where = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FOLDER|CONFIG", help="Folder of a run, or its experiment file.", show_default=False
+    ),
+]
 Runs = Annotated[
     str | None,
     typer.Option("--runs", metavar="N", help="Number of runs instead of the file's (1e5 will do)."),

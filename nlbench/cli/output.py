@@ -7,8 +7,11 @@ import math
 import os
 import sys
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, TextIO
+
+from nlbench.errors import NlbenchError
 
 WIDTH = 80
 STYLES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33"}
@@ -35,6 +38,17 @@ def next_step(command: str, why: str) -> None:
 def as_json(value: Any) -> None:
     """One JSON document; what is not finite becomes null."""
     print(json.dumps(_finite(value), indent=2, ensure_ascii=False))
+
+
+@contextmanager
+def errors_as_json(wanted: bool) -> Iterator[None]:
+    """Have an error on stdout too, for the program that reads JSON there: its exit code and what it says."""
+    try:
+        yield
+    except NlbenchError as error:
+        if wanted:
+            as_json({"exit_code": error.exit_code, "error": str(error)})
+        raise
 
 
 def _finite(value: Any) -> Any:

@@ -36,16 +36,17 @@ def run(
 
     What was computed before is kept: a larger --runs tops up, the same command after an interruption goes on.
     """
-    asked = options.precision(precision, runs)
-    longest = None if yes else budget.seconds(limit)
-    experiment = options.experiment(config, runs, seed, settings)
-    if gate and not experiment.claims:
-        raise ConfigError(f"{config}: --gate needs claims, and the file makes none")
-    chosen = None
-    if asked is not None:
-        experiment, chosen = _chosen(experiment, out, asked, longest, quiet=json)
-    results = _computed(experiment, out, longest, quiet=json)
-    report = _reported(results)
+    with output.errors_as_json(json):
+        asked = options.precision(precision, runs)
+        longest = None if yes else budget.seconds(limit)
+        experiment = options.experiment(config, runs, seed, settings)
+        if gate and not experiment.claims:
+            raise ConfigError(f"{config}: --gate needs claims, and the file makes none")
+        chosen = None
+        if asked is not None:
+            experiment, chosen = _chosen(experiment, out, asked, longest, quiet=json)
+        results = _computed(experiment, out, longest, quiet=json)
+        report = _reported(results)
     from nlbench.cli import summary
 
     facts = summary.facts(experiment, results, report)
@@ -93,9 +94,9 @@ def _computed(experiment: Experiment, out: Path, longest: float | None, quiet: b
 def _watched(longest: float | None, quiet: bool) -> Iterator[Progress | None]:
     """Progress that keeps to the budget, while SIGTERM does what Ctrl-C does."""
     from nlbench.cli.progress import progress
-    from nlbench.cli.signals import terminated_like_interrupted
+    from nlbench.cli.signals import ended_by_a_second, terminated_like_interrupted
 
-    with terminated_like_interrupted(), progress(quiet) as show:
+    with terminated_like_interrupted(), ended_by_a_second(), progress(quiet) as show:
         yield show if longest is None else budget.Guard(longest, show)
 
 

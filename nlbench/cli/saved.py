@@ -12,22 +12,12 @@ from nlbench.errors import ConfigError
 
 
 def report(
-    where: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FOLDER|CONFIG", help="Folder of a run, or its experiment file.", show_default=False
-        ),
-    ],
+    where: options.Where,
     settings: options.Set = None,
     out: options.Out = Path("results"),
 ) -> None:
     """Draw figures and write the report from saved tables."""
-    folder = where
-    if not where.is_dir():
-        folder = options.folder(options.experiment(where, None, None, settings), out)
-        if not folder.is_dir():
-            first = options.command("run", where, settings)
-            raise ConfigError(f"{where}: no results in {folder}; make them with: {first}")
+    folder = found(where, settings, out)
     from nlbench import report as reports
     from nlbench.errors import DamagedResults, EnvironmentFault
     from nlbench.results.folder import RunFolder
@@ -42,6 +32,17 @@ def report(
     page = reports.write(Results(folder))
     print(f"report  {page}")
     output.next_step(f"open {page}", "all figures and tables on one page; it needs no network")
+
+
+def found(where: Path, settings: list[str] | None, out: Path) -> Path:
+    """The folder of a run, given by itself or by its experiment file. Raises `ConfigError` where there is none."""
+    if where.is_dir():
+        return where
+    folder = options.folder(options.experiment(where, None, None, settings), out)
+    if not folder.is_dir():
+        first = options.command("run", where, settings)
+        raise ConfigError(f"{where}: no results in {folder}; make them with: {first}")
+    return folder
 
 
 def replay(
@@ -70,7 +71,10 @@ def replay(
 
     frame = engine.replay(experiment, label, trajectory)
     if csv is not None:
-        frame.to_csv(csv, index=False)
+        from nlbench.results.atomic import atomic_write
+        from nlbench.results.tables import csv_bytes
+
+        atomic_write(csv, csv_bytes(frame))
         print(f"{csv}: {len(frame):,} rows")
     elif json:
         output.as_json(frame.to_dict(orient="records"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["plan", "replay", "run"]
+__all__ = ["plan", "replay", "run", "verify"]
 
 
 def run(experiment: Any, out: Any = None, progress: Any = None, check: Any = None) -> Any:
@@ -39,6 +39,18 @@ def replay(experiment: Any, label: str, trajectory: int) -> Any:
     from nlbench.engine.trace import replay
 
     return replay(*_stated(experiment), label, trajectory)
+
+
+def verify(results: Any, block: int | None = None) -> Any:
+    """Whether a finished run still is what it wrote, and one of its blocks, with its group, comes out again.
+
+    results: `Results` or the folder of a run. block: its number; a random one unless said. Returns a `Verified`, whose
+    `faults` is empty where nothing is wrong; writes nothing.
+    """
+    from nlbench.engine.verification import verify
+    from nlbench.results.results import Results
+
+    return verify(results if isinstance(results, Results) else Results(results), block)
 
 
 def _stated(given: Any) -> tuple[Any, Any]:

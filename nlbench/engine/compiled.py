@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import time
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import numpy as np
-from jax.experimental.compilation_cache import compilation_cache
 
 from nlbench.engine.block import View, chunk_sums, make_chunk, words
+from nlbench.engine.program_cache import use_cache
 
 if TYPE_CHECKING:
     from nlbench.engine.problem import Problem
@@ -36,7 +34,8 @@ class Compiled(NamedTuple):
         """Sums of blocks first_block ... first_block + count - 1, on the host."""
         chunk = make_chunk(self.problem, first_block, count, CAPACITY, runs)
         sums, _ = self.executable(self.seed, chunk)
-        return {name: np.asarray(value)[:count] for name, value in sums.items()}
+        # Copied, so that sums that wait to be added do not keep arrays of the full capacity.
+        return {name: np.asarray(value)[:count].copy() for name, value in sums.items()}
 
     def view(self, trajectory: int) -> View:
         """One trajectory in full, computed with its block by the same executable."""
@@ -55,14 +54,3 @@ def compile_chunks(problem: Problem, seed: int) -> Compiled:
     program = hashlib.sha256(lowered.as_text().encode()).hexdigest()[:12]
     executable = lowered.compile()
     return Compiled(executable, problem, seed_words, time.perf_counter() - begun, program)
-
-
-def use_cache() -> None:
-    """Keep compiled programs on disk, in $NLBENCH_CACHE or the user's cache folder."""
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = os.environ.get("NLBENCH_CACHE") or Path(base) / "nlbench" / "xla"
-    if jax.config.jax_compilation_cache_dir != str(folder):  # type: ignore[attr-defined]
-        jax.config.update("jax_compilation_cache_dir", str(folder))
-        compilation_cache.reset_cache()  # jax stays with the folder of its first compilation
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
-    jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)

@@ -13,8 +13,9 @@ from nlbench.engine.bounds import bounds_table
 from nlbench.engine.compiled import CAPACITY, Compiled, compile_chunks
 from nlbench.engine.finish import complete, read_anew, write
 from nlbench.engine.interruption import stop_requests
+from nlbench.engine.memory import Load, memory_faults
 from nlbench.engine.problem import make
-from nlbench.engine.resume import checkpoint, finished_runs, resumed, sound
+from nlbench.engine.resume import Saver, finished_runs, resumed, sound
 from nlbench.engine.workers import Threads, Workers, in_order
 from nlbench.errors import Interrupted
 from nlbench.results.folder import RunFolder
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 Check = Callable[[Compiled, Totals, int, int, Path], None]  # program, totals, runs, threads, folder
-SECONDS_BETWEEN_CHECKPOINTS = 5.0
-CHECKPOINT_SHARE = 30  # ... or more, so that writing large ones takes a thirtieth of the time
 
 
 def run(
@@ -40,7 +39,7 @@ def run(
     check: Check | None = None,
 ) -> Results:
     """Compute what is missing of an experiment and write its results. `check` may raise before anything is computed."""
-    with stop_requests() as stopped:
+    with stop_requests() as stopped, memory_faults():
         return _run(experiment, own, Path(out), progress or (lambda done, total: None), stopped, check)
 
 
@@ -97,22 +96,28 @@ def compute(
     progress: Progress,
     stopped: Callable[[], bool],
 ) -> Totals:
-    """Totals of all runs. The checkpoint holds whole blocks; a last, partial one is added to a copy."""
-    block = compiled.problem.block
-    whole, rest = divmod(runs, block)
-    saved, saved_at = totals.blocks, time.monotonic()
+    """Totals of all runs. The checkpoint holds whole blocks; a last, partial one is added to a copy.
+
+    Whatever ends it early, what was added is saved first; where memory runs out, it goes on with less at a time.
+    """
+    whole, rest = divmod(runs, compiled.problem.block)
+    saver, load = Saver(folder, compiled, totals), Load(chunk, 2 * workers.at_once)
     progress(totals.runs, runs)
-    pause = SECONDS_BETWEEN_CHECKPOINTS
-    for first, sums in in_order(workers, totals.blocks, whole, chunk, stopped):
-        totals.add(first, sums)
-        progress(totals.runs, runs)
-        begun = time.monotonic()
-        if begun - saved_at > pause:
-            checkpoint(folder, compiled, totals)
-            saved, saved_at = totals.blocks, time.monotonic()
-            pause = max(pause, CHECKPOINT_SHARE * (saved_at - begun))
-    if totals.blocks != saved:
-        checkpoint(folder, compiled, totals)
+    while totals.blocks < whole and not stopped():
+        adding = False
+        try:
+            for first, sums in in_order(workers, totals.blocks, whole, load.chunk, stopped, load.ahead):
+                adding = True
+                totals.add(first, sums)
+                adding = False
+                progress(totals.runs, runs)
+                saver.now_and_then(totals)
+        except Exception as error:
+            if adding:  # half a block may have been added
+                totals = resumed(folder, compiled)
+            saver.save(totals)
+            load = load.halved(error)
+    saver.save(totals)
     if stopped():
         raise Interrupted(
             f"stopped after {totals.runs:,} of {runs:,} runs, which are saved; the same command goes on from there"

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from nlbench.config import Experiment
+    from nlbench.engine.problem import Problem
 
 OWN_FACTS = ("schema", "checksums", "runs")  # of a manifest: what writing it adds
 
@@ -71,6 +72,13 @@ def _remove(folder: RunFolder, *names: str) -> None:
             remove(left)
 
 
+def of_totals(problem: Problem, totals: Totals) -> dict[str, pd.DataFrame]:
+    """The tables that follow from the totals alone."""
+    made = tables(totals)
+    made["consistency"] = consistency_table(totals, made["statistics"], problem.truth.measurements)
+    return made
+
+
 def write(
     folder: RunFolder,
     experiment: Experiment,
@@ -82,8 +90,7 @@ def write(
 ) -> None:
     """Write everything that a finished run leaves, the mark that it is done last."""
     problem = compiled.problem
-    made = tables(totals)
-    made["consistency"] = consistency_table(totals, made["statistics"], problem.truth.measurements)
+    made = of_totals(problem, totals)
     if bounds is not None:
         made["bounds"] = bounds
     layout = problem.layout

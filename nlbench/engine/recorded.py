@@ -13,8 +13,8 @@ import numpy as np
 from nlbench import filters, systems
 from nlbench.config.consistency import MOST_STEPS
 from nlbench.config.schema import PARTICLES, FilterSpec
-from nlbench.engine.compiled import use_cache
 from nlbench.engine.problem import overridden
+from nlbench.engine.program_cache import use_cache
 from nlbench.errors import ConfigError, Problem
 from nlbench.filters import data
 from nlbench.statistics.chi_square import quantile

@@ -1,36 +1,40 @@
-"""What an earlier run left in its folder: finished results, or a checkpoint to go on from."""
+"""What a run leaves in its folder for a later one: finished results, or a checkpoint to go on from."""
 
 from __future__ import annotations
 
 import logging
+import time
 
 import jax
 
 from nlbench.engine.compiled import Compiled
 from nlbench.errors import DamagedResults, EnvironmentFault
 from nlbench.results.fingerprint import differences, fingerprint
-from nlbench.results.folder import RunFolder
+from nlbench.results.folder import CHECKPOINT, RunFolder
+from nlbench.results.manifest import SCHEMA
 from nlbench.results.results import Results
 from nlbench.statistics.totals import Totals
 
+SECONDS_BETWEEN_CHECKPOINTS = 5.0
+CHECKPOINT_SHARE = 30  # ... or more, so that writing large ones takes a thirtieth of the time
 log = logging.getLogger("nlbench")
 
 
 def finished_runs(folder: RunFolder) -> int | None:
     """How many runs are done; None if none are, or if that cannot be told."""
     try:
-        return folder.done_runs()
+        done = folder.done_runs()
+        if done is not None:
+            Results(folder.path).check_done()
     except DamagedResults as fault:
         log.warning("%s; it is written anew", fault)
         return None
+    return done
 
 
 def sound(folder: RunFolder) -> bool:
     """Whether a finished run still is what it wrote."""
-    try:
-        faults = Results(folder.path).damaged()
-    except DamagedResults as unreadable:
-        faults = [str(unreadable)]
+    faults = Results(folder.path).damaged()
     for fault in faults:
         log.warning("%s; it is computed anew", fault)
     return not faults
@@ -46,6 +50,12 @@ def resumed(folder: RunFolder, compiled: Compiled) -> Totals:
     if saved is None:
         return Totals(compiled.problem.layout)
     arrays, facts = saved
+    # Checkpoints did not say their schema before there was a third one.
+    if facts.get("schema", SCHEMA) != SCHEMA:
+        raise EnvironmentFault(
+            f"{folder.path / CHECKPOINT}: schema {facts['schema']}, this version of nlbench writes schema {SCHEMA}: "
+            "choose another folder with --out, or delete that one"
+        )
     changed = differences(numerics(compiled), facts["fingerprint"])
     if changed:
         raise EnvironmentFault(
@@ -55,9 +65,28 @@ def resumed(folder: RunFolder, compiled: Compiled) -> Totals:
     return Totals.from_state(compiled.problem.layout, arrays)
 
 
-def checkpoint(folder: RunFolder, compiled: Compiled, totals: Totals) -> None:
-    """Save the totals of the blocks so far."""
-    folder.save_checkpoint(totals.state(), fingerprint=numerics(compiled))
+class Saver:
+    """Saves totals now and then, and knows which are saved."""
+
+    def __init__(self, folder: RunFolder, compiled: Compiled, totals: Totals):
+        """totals: those of the checkpoint, or fresh ones."""
+        self._folder, self._compiled = folder, compiled
+        self._blocks, self._at, self._pause = totals.blocks, time.monotonic(), SECONDS_BETWEEN_CHECKPOINTS
+
+    def now_and_then(self, totals: Totals) -> None:
+        """Save the totals if the last time is long enough ago."""
+        begun = time.monotonic()
+        if begun - self._at > self._pause:
+            self.save(totals)
+            self._at = time.monotonic()
+            self._pause = max(self._pause, CHECKPOINT_SHARE * (self._at - begun))
+
+    def save(self, totals: Totals) -> None:
+        """Save the totals unless they are saved."""
+        if totals.blocks != self._blocks:
+            facts = {"schema": SCHEMA, "fingerprint": numerics(self._compiled)}
+            self._folder.save_checkpoint(totals.state(), **facts)
+            self._blocks = totals.blocks
 
 
 def numerics(compiled: Compiled) -> dict[str, str]:

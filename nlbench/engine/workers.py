@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 
@@ -56,27 +56,42 @@ class Threads:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._pool.shutdown()
+        # Who has no patience left does not wait for the calls under way.
+        self._pool.shutdown(wait=not isinstance(error, KeyboardInterrupt), cancel_futures=True)
 
 
 def in_order(
-    workers: Workers, first: int, last: int, chunk: int, stopped: Callable[[], bool]
+    workers: Workers,
+    first: int,
+    last: int,
+    chunk: int,
+    stopped: Callable[[], bool],
+    ahead: int | None = None,
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     """Sums of blocks first ... last - 1 in order, computed by workers that run ahead; ends early when stopped.
 
     A call takes as many blocks as take about `SECONDS_OF_A_CALL`, so that a run stops soon after it is asked to.
+    ahead: calls that are under way or wait to be taken, twice `at_once` unless said. When a call fails, its error is
+    raised once no other is under way: their memory is free again.
     """
+    ahead = ahead or 2 * workers.at_once
     most = min(chunk, CAPACITY, max(1, -(-(last - first) // (4 * workers.at_once))))
     start, size = first, 1
     pending: deque[tuple[int, int, Future[Part]]] = deque()
-    while True:
-        while len(pending) < 2 * workers.at_once and not stopped() and start < last:
-            count = min(size, last - start)
-            pending.append((start, count, workers.submit(start, count)))
-            start += count
-        if not pending:
-            return
-        begin, count, future = pending.popleft()
-        sums, seconds = future.result()
-        size = max(1, min(most, int(count * SECONDS_OF_A_CALL / max(seconds, 1e-9))))
-        yield begin, sums
+    try:
+        while True:
+            while len(pending) < ahead and not stopped() and start < last:
+                count = min(size, last - start)
+                pending.append((start, count, workers.submit(start, count)))
+                start += count
+            if not pending:
+                return
+            begin, count, future = pending.popleft()
+            sums, seconds = future.result()
+            del future  # it holds the sums
+            size = max(1, min(most, int(count * SECONDS_OF_A_CALL / max(seconds, 1e-9))))
+            yield begin, sums
+            del sums
+    except Exception:
+        wait([each for *_, each in pending if not each.cancel()])
+        raise

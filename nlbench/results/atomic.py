@@ -12,7 +12,7 @@ from nlbench.errors import EnvironmentFault
 _SUFFIX = ".partial"
 
 
-def atomic_write(path: Path, data: bytes) -> None:
+def atomic_write(path: Path, data: bytes | memoryview) -> None:
     """Write `data` to `path`: into a file beside it, to the disk, then renamed over `path`.
 
     The folder is made if need be. Raises `EnvironmentFault` and leaves `path` as it was when the disk is full
@@ -47,6 +47,11 @@ def sweep(folder: Path) -> None:
     """Remove what a killed process left half written in `folder`."""
     for left in folder.glob(f".*{_SUFFIX}"):
         remove(left)
+
+
+def is_partial(path: Path) -> bool:
+    """Whether a file is one that was being written, and is swept before anything else is."""
+    return path.name.startswith(".") and path.suffix == _SUFFIX
 
 
 def write_fault(path: Path, error: OSError, needed: int | None = None) -> EnvironmentFault:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from nlbench.errors import DamagedResults
+from nlbench.errors import DamagedResults, EnvironmentFault
 from nlbench.results.atomic import atomic_write
 from nlbench.results.checksum import of_arrays
 
@@ -25,16 +25,21 @@ def save_checkpoint(path: Path, arrays: Mapping[str, np.ndarray], facts: Mapping
     content[_CHECKSUM] = np.frombuffer(of_arrays(content).encode(), np.uint8)
     buffer = io.BytesIO()
     np.savez(buffer, allow_pickle=False, **content)
-    atomic_write(path, buffer.getvalue())
+    atomic_write(path, buffer.getbuffer())
 
 
 def load_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """The arrays and facts saved at `path`. Raises `DamagedResults` unless they are exactly those saved."""
+    """The arrays and facts saved at `path`. Raises `DamagedResults` unless they are exactly those saved, and
+    `EnvironmentFault` where the file cannot be read, which is no reason to begin again."""
     try:
         with np.load(path, allow_pickle=False) as file:
             content = {name: file[name] for name in file.files}
         checksum = content.pop(_CHECKSUM).tobytes().decode()
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError) as error:
+    except OSError as error:
+        if error.errno is None:  # raised by NumPy about the content
+            raise DamagedResults(f"{path}: not a checkpoint that can be read ({error})") from error
+        raise EnvironmentFault(f"{path}: cannot be read ({error.strerror})") from error
+    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError) as error:
         raise DamagedResults(f"{path}: not a checkpoint that can be read ({error})") from error
     if checksum != of_arrays(content):
         raise DamagedResults(f"{path}: the checksum does not match the content; the file is damaged")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nlbench.errors import DamagedResults
+from nlbench.errors import DamagedResults, EnvironmentFault
 from nlbench.results import lock
 from nlbench.results.atomic import atomic_write, remove, sweep
 from nlbench.results.checksum import of_bytes
@@ -16,11 +17,14 @@ if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
 
-CHECKPOINT = "batches/checkpoint.npz"
+BATCHES = "batches"
+CHECKPOINT = f"{BATCHES}/checkpoint.npz"
 EXPERIMENT = "config.resolved.yaml"
 MANIFEST = "manifest.json"
 TABLES = "tables"
 DONE = "DONE"
+LOCK = ".lock"
+log = logging.getLogger("nlbench")
 
 
 class RunFolder:
@@ -28,19 +32,38 @@ class RunFolder:
 
     def __init__(self, path: str | Path):
         self.path = Path(path)
+        self._holding = contextlib.ExitStack()
+        self._held: lock.Held | None = None
+        self._experiment: str | None = None
+        self._written: dict[str, str] = {}
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[RunFolder]:
         """Hold the folder alone and sweep what a dead process left; `LockedError` if a live one holds it."""
-        with lock.exclusive(self.path / ".lock"):
-            for folder in (self.path, *(self.path / name for name in ("batches", TABLES, "figures"))):
-                sweep(folder)
+        with self._holding:
+            self._hold()
             yield self
 
+    def _hold(self) -> None:
+        self._held = self._holding.enter_context(lock.exclusive(self.path / LOCK))
+        for folder in (self.path, *(self.path / name for name in (BATCHES, TABLES, "figures"))):
+            sweep(folder)
+
+    def _removed(self) -> bool:
+        """Whether somebody removed or replaced the folder that is held."""
+        return self._held is not None and not self._held.in_place()
+
     def save_checkpoint(self, arrays: Mapping[str, np.ndarray], **facts: Any) -> None:
-        """Replace the checkpoint."""
+        """Replace the checkpoint; in a new folder if somebody removed the one that was held."""
         from nlbench.results.checkpoint import save_checkpoint
 
+        if self._removed():
+            log.warning("%s was removed while the run was using it; it is made anew", self.path)
+            self._holding.close()
+            self._hold()
+            self.reopen()
+            if self._experiment is not None:
+                self.write_experiment(self._experiment)
         save_checkpoint(self.path / CHECKPOINT, arrays, facts)
 
     def load_checkpoint(self) -> tuple[dict[str, np.ndarray], dict[str, Any]] | None:
@@ -52,23 +75,45 @@ class RunFolder:
 
     def write_experiment(self, text: str) -> None:
         """Write the resolved experiment."""
+        self._experiment = text
         atomic_write(self.path / EXPERIMENT, text.encode())
 
     def write_tables(self, tables: Mapping[str, pd.DataFrame]) -> None:
         """Write tables, each as CSV and Parquet."""
         from nlbench.results.tables import write_table
 
+        self._check()
         for name, table in tables.items():
-            write_table(self.path / TABLES, name, table)
+            written = write_table(self.path / TABLES, name, table)
+            self._written |= {f"{TABLES}/{file}": checksum for file, checksum in written.items()}
 
     def finish(self, runs: int, **facts: Any) -> None:
-        """Write the manifest, with checksums of what the folder holds, and the mark that `runs` are done."""
+        """Write the manifest, with checksums of what the folder holds, and the mark that `runs` are done.
+
+        Raises `EnvironmentFault` where a table is not as it was written a moment ago.
+        """
         from nlbench.results.manifest import write_manifest
 
-        kept = [self.path / EXPERIMENT, self.path / CHECKPOINT, *sorted((self.path / TABLES).iterdir())]
-        checksums = {str(p.relative_to(self.path)): of_bytes(p.read_bytes()) for p in kept if p.exists()}
+        self._check()
+        try:
+            kept = [self.path / EXPERIMENT, self.path / CHECKPOINT, *sorted((self.path / TABLES).iterdir())]
+            checksums = {str(p.relative_to(self.path)): of_bytes(p.read_bytes()) for p in kept if p.exists()}
+        except OSError as error:
+            raise EnvironmentFault(f"{error.filename}: cannot be read ({error.strerror})") from error
+        for name, checksum in self._written.items():
+            if checksums.get(name) != checksum:
+                raise EnvironmentFault(
+                    f"{self.path / name} was removed or changed while the run was writing: give the same command again"
+                )
         write_manifest(self.path / MANIFEST, {**facts, "runs": runs, "checksums": checksums})
         atomic_write(self.path / DONE, f"{runs}\n".encode())
+
+    def _check(self) -> None:
+        """Raise `EnvironmentFault` where the folder is no longer the one that is held."""
+        if self._removed():
+            raise EnvironmentFault(
+                f"{self.path} was removed or replaced while the run was writing its tables: give the same command again"
+            )
 
     def reopen(self) -> None:
         """Take the mark away before anything is changed."""

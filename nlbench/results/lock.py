@@ -9,23 +9,33 @@ import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import IO, NamedTuple
 
 from nlbench.errors import LockedError
 from nlbench.results.atomic import write_fault
 
 
+class Held(NamedTuple):
+    """A lock that is held, by the open file."""
+
+    path: Path
+    file: IO[str]
+
+    def in_place(self) -> bool:
+        """Whether the file at the path still is the one that is held: not where the folder was removed or replaced."""
+        try:
+            return os.path.samestat(os.fstat(self.file.fileno()), self.path.stat())
+        except (OSError, ValueError):  # a file that is closed
+            return False
+
+
 @contextlib.contextmanager
-def exclusive(path: Path) -> Iterator[None]:
+def exclusive(path: Path) -> Iterator[Held]:
     """Hold the lock file at `path`. Raises `LockedError`, naming the holder, if a live process has it.
 
     The file stays when the lock is released: removing it would let two processes hold two files of one name.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-    except OSError as error:
-        raise write_fault(path, error) from error
-    with contextlib.closing(os.fdopen(descriptor, "r+")) as file:
+    with contextlib.closing(_opened(path)) as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -39,7 +49,16 @@ def exclusive(path: Path) -> Iterator[None]:
             file.flush()
         except OSError as error:
             raise write_fault(path, error) from error
-        yield
+        yield Held(path, file)
+
+
+def _opened(path: Path) -> IO[str]:
+    """The file, made if need be."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644), "r+")
+    except OSError as error:
+        raise write_fault(path, error) from error
 
 
 def _holder(text: str) -> str:

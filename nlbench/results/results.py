@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nlbench.errors import DamagedResults
 from nlbench.results import checksum
-from nlbench.results.folder import EXPERIMENT, MANIFEST, TABLES
+from nlbench.results.atomic import is_partial
+from nlbench.results.folder import BATCHES, DONE, EXPERIMENT, MANIFEST, TABLES, RunFolder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,12 +59,41 @@ class Results:
     def damaged(self) -> list[str]:
         """What is wrong with each file that is missing or was changed since the run wrote it."""
         found = []
-        for name in self.manifest["checksums"]:
+        try:
+            names = list(self.manifest["checksums"])
+        except DamagedResults as error:
+            return [str(error)]
+        checks: list[Callable[[], object]] = [self.check_done]
+        checks += [partial(self._checked, name) for name in names]
+        for check in checks:
             try:
-                self._checked(name)
+                check()
             except DamagedResults as error:
                 found.append(str(error))
         return found
+
+    def unknown(self) -> list[str]:
+        """Files among the tables and batches that the run did not write."""
+        found = sorted(path for folder in (BATCHES, TABLES) for path in (self.path / folder).rglob("*"))
+        names = {str(path.relative_to(self.path)): path for path in found if path.is_file()}
+        known = self.manifest["checksums"]
+        return [
+            f"{path}: the run did not write this file; remove it"
+            for name, path in names.items()
+            if name not in known and not is_partial(path)
+        ]
+
+    def check_done(self) -> None:
+        """Raise `DamagedResults` where the mark that the run is done does not say what a sound manifest says."""
+        done = RunFolder(self.path).done_runs()
+        try:
+            runs = self.manifest["runs"]
+        except DamagedResults:
+            return
+        if done is not None and done != runs:
+            raise DamagedResults(
+                f"{self.path / DONE}: says {done:,} runs, the manifest {runs:,}; it was edited"
+            )
 
     def _checked(self, name: str) -> bytes:
         path = self.path / name

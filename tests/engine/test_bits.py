@@ -12,7 +12,7 @@ import pytest
 from jax.experimental.compilation_cache import compilation_cache
 
 import nlbench as nb
-from nlbench.engine.compiled import use_cache
+from nlbench.engine.program_cache import use_cache
 from nlbench.results.results import Results
 from tests.small_runs import experiment, python, table_bytes
 
@@ -78,8 +78,8 @@ def test_block_and_precision_make_another_experiment():
 @pytest.mark.parametrize("kills", [3, pytest.param(60, marks=pytest.mark.long)])
 def test_killed_at_any_moment_and_resumed_gives_the_same_bytes(tmp_path, kills):
     """Killed up to so many times, at the first checkpoint after each start or up to 0.09 s later."""
-    program = RUN.replace("import sys\n", "import sys\nimport nlbench.engine.driver as driver\n", 1)
-    program = program.replace("nb.configure()", "nb.configure()\ndriver.SECONDS_BETWEEN_CHECKPOINTS = 0.05")
+    program = RUN.replace("import sys\n", "import sys\nimport nlbench.engine.resume as resume\n", 1)
+    program = program.replace("nb.configure()", "nb.configure()\nresume.SECONDS_BETWEEN_CHECKPOINTS = 0.05")
     runs = "150000"
     assert python(program, runs, str(tmp_path / "straight")).returncode == 0
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "XLA_FLAGS": ""}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from nlbench.engine import cost
-from nlbench.engine.driver import CHECKPOINT_SHARE, SECONDS_BETWEEN_CHECKPOINTS
+from nlbench.engine.resume import CHECKPOINT_SHARE, SECONDS_BETWEEN_CHECKPOINTS
 
 if TYPE_CHECKING:
     from nlbench.engine.planning.calibration import Calibration
