@@ -23,6 +23,7 @@ Set = Annotated[
     ),
 ]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of all results.")]
+Gate = Annotated[bool, typer.Option("--gate", help="Exit with 3 unless every claim is confirmed.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 
 

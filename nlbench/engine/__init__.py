@@ -7,18 +7,19 @@ from typing import Any
 __all__ = ["plan", "replay", "run"]
 
 
-def run(experiment: Any, out: Any = None, progress: Any = None) -> Any:
+def run(experiment: Any, out: Any = None, progress: Any = None, dask: str | None = None) -> Any:
     """Run an experiment, or go on with one that was stopped, and return its `Results`.
 
     experiment: an `Experiment`, a path of an experiment file, or a dict with the keys of one, whose `system` may be a
         `System` or `DiscreteSystem` of your own.
     out: folder of results (default "results"). progress: called with (runs done, runs in all).
+    dask: compute with the workers of a dask scheduler, "tcp://HOST:PORT", or with "local:N" processes.
     Raises `ConfigError` before anything is computed, `LockedError` where another process runs the same experiment,
     `EnvironmentFault` for disk and memory, `Interrupted` after Ctrl-C with everything so far saved.
     """
     from nlbench.engine.driver import run
 
-    return run(*_stated(experiment), "results" if out is None else out, progress)
+    return run(*_stated(experiment), "results" if out is None else out, progress, dask)
 
 
 def plan(experiment: Any) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 from jax.experimental.compilation_cache import compilation_cache
 
 from nlbench.engine.block import View, chunk_sums, make_chunk, words
+from nlbench.statistics.share import ALL, Share
 
 if TYPE_CHECKING:
     from nlbench.engine.problem import Problem
@@ -31,10 +32,11 @@ class Compiled(NamedTuple):
     seed: tuple[Any, Any]
     seconds: float
     program: str
+    share: Share = ALL
 
     def sums(self, first_block: int, count: int, runs: int) -> dict[str, np.ndarray]:
-        """Sums of blocks first_block ... first_block + count - 1, on the host."""
-        chunk = make_chunk(self.problem, first_block, count, CAPACITY, runs)
+        """Sums of blocks first_block ... first_block + count - 1 of the share, on the host."""
+        chunk = make_chunk(self.problem, first_block, count, CAPACITY, runs, share=self.share)
         sums, _ = self.executable(self.seed, chunk)
         return {name: np.asarray(value)[:count] for name, value in sums.items()}
 

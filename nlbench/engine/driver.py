@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nlbench import runtime
 from nlbench.config.schema import SystemSpec
 from nlbench.engine.bounds import bounds_table
+from nlbench.engine.cluster import dask_workers
 from nlbench.engine.compiled import CAPACITY, Compiled, compile_chunks
 from nlbench.engine.finish import read_anew, traced, write
 from nlbench.engine.interruption import stop_requests
 from nlbench.engine.problem import make
-from nlbench.engine.resume import checkpoint, finished_runs, resumed, sound
+from nlbench.engine.remote import Task
+from nlbench.engine.resume import checkpoint, finished_runs, numerics, resumed, sound
 from nlbench.engine.workers import Threads, Workers, in_order
-from nlbench.errors import Interrupted
+from nlbench.errors import ConfigError, Interrupted
 from nlbench.results.folder import RunFolder
 from nlbench.results.results import Results
 from nlbench.statistics.totals import Totals
@@ -36,10 +39,15 @@ def run(
     own: System | DiscreteSystem | None,
     out: str | Path,
     progress: Progress | None = None,
+    dask: str | None = None,
 ) -> Results:
-    """Compute what is missing of an experiment and write its results."""
+    """Compute what is missing of an experiment and write its results. dask: where its workers are, if not here."""
+    if dask is not None and own is not None:
+        raise ConfigError(
+            "a system that exists in this process only cannot be sent to dask workers: name one"
+        )
     with stop_requests() as stopped:
-        return _run(experiment, own, Path(out), progress or (lambda done, total: None), stopped)
+        return _run(experiment, own, Path(out), progress or (lambda done, total: None), stopped, dask)
 
 
 def _run(
@@ -48,6 +56,7 @@ def _run(
     out: Path,
     progress: Progress,
     stopped: Callable[[], bool],
+    dask: str | None,
 ) -> Results:
     problem = make(experiment, own)
     compiled = None
@@ -70,11 +79,20 @@ def _run(
         runs = max(runs, totals.runs)
         threads = experiment.engine.threads or runtime.threads()
         chunk = experiment.engine.chunk or CAPACITY
-        with Threads(compiled, runs, threads) as workers:
+        with _workers(experiment, compiled, runs, threads, dask) as workers:
             totals = _compute(compiled, folder, totals, runs, workers, chunk, progress, stopped)
         seconds = time.perf_counter() - begun
         write(folder, experiment, compiled, totals, seconds, threads, bounds)
     return Results(folder.path)
+
+
+def _workers(
+    experiment: Experiment, compiled: Compiled, runs: int, threads: int, dask: str | None
+) -> AbstractContextManager[Workers]:
+    """Threads of this process, or the workers of a cluster."""
+    if dask is None:
+        return Threads(compiled, runs, threads)
+    return dask_workers(dask, Task(experiment.resolved_yaml(), runs, tuple(numerics(compiled).items())))
 
 
 def _identified(experiment: Experiment, program: str) -> Experiment:
