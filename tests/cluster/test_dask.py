@@ -7,6 +7,7 @@ import os
 import signal
 import time
 from concurrent.futures import CancelledError
+from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
@@ -131,7 +132,7 @@ def test_a_scheduler_that_is_gone_ends_the_run(workers):
 
 def test_blocks_that_killed_workers_are_sent_again_but_not_for_ever(workers):
     killed = pytest.importorskip("distributed.scheduler").KilledWorker
-    lost = [killed("task", None, 3)] * 10
+    lost = [killed("task", SimpleNamespace(address="tcp://worker:1"), 3)] * 10
     sender = workers(*lost)
     with pytest.raises(EnvironmentFault, match="kill each worker"):
         sender.submit(0, 1).result(20)

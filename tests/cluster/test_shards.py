@@ -50,6 +50,7 @@ def test_merged_shards_are_the_run_of_one_machine(sharded, one_machine, tmp_path
     assert table_bytes(merge(small(), sharded, tmp_path).path) == one_machine
 
 
+@pytest.mark.long
 def test_a_shard_that_was_stopped_goes_on(copied, one_machine, tmp_path):
     shutil.rmtree(shard_folder(copied[1], 2))
     stops = iter([True])
@@ -69,6 +70,7 @@ def test_a_shard_that_was_stopped_goes_on(copied, one_machine, tmp_path):
     assert table_bytes(merge(small(), copied, tmp_path / "merged").path) == one_machine
 
 
+@pytest.mark.long
 def test_shards_are_topped_up(copied, tmp_path):
     more = small(4000)
     for number in (1, 2, 3):
@@ -85,7 +87,7 @@ def test_missing_shards_are_named_and_nothing_is_written(sharded, tmp_path):
 
 def test_a_shard_given_twice_is_named(copied, tmp_path):
     shutil.copytree(shard_folder(copied[1], 2), shard_folder(copied[0], 1).parent / "2-of-3")
-    with pytest.raises(ConfigError, match="there twice: .*2-of-3 and .*2-of-3"):
+    with pytest.raises(ConfigError, match=r"there twice: .*2-of-3 and .*2-of-3"):
         merge(small(), copied, tmp_path / "merged")
 
 

@@ -1,4 +1,4 @@
-"""Claims: the shares of a run have each block once, and their totals joined are those of one machine to the last bit."""
+"""Claims: the shares of a run have each block once; joined, they are the totals of one machine to the last bit."""
 
 from __future__ import annotations
 
