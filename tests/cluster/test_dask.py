@@ -160,9 +160,16 @@ class KillOneWorker:
             os.kill(self.killed, signal.SIGKILL)
 
 
-def interrupt(done, total):
-    if 0 < done < total:
-        signal.raise_signal(signal.SIGINT)
+class InterruptOnce:
+    """Progress that raises SIGINT the first time that something, but not everything, is done."""
+
+    def __init__(self):
+        self.due = True
+
+    def __call__(self, done, total):
+        if self.due and 0 < done < total:
+            self.due = False
+            signal.raise_signal(signal.SIGINT)
 
 
 @pytest.mark.long
@@ -173,8 +180,14 @@ def test_two_workers_one_killed_give_the_bytes_of_one_machine(tmp_path):
     killed = nb.run(small(), tmp_path / "killed", progress=killer, dask="local:2")
     assert killer.killed is not None
     assert table_bytes(killed.path) == one
+
+
+@pytest.mark.long
+def test_ctrl_c_saves_what_workers_gave_and_the_same_command_goes_on(tmp_path):
+    pytest.importorskip("distributed")
+    one = table_bytes(nb.run(small(), tmp_path / "one").path)
     with pytest.raises(Interrupted, match="the same command goes on"):
-        nb.run(small(), tmp_path / "stopped", progress=interrupt, dask="local:2")
+        nb.run(small(), tmp_path / "stopped", progress=InterruptOnce(), dask="local:2")
     seen = []
     resumed = nb.run(small(), tmp_path / "stopped", lambda done, total: seen.append(done), dask="local:2")
     assert seen[0] > 0
