@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from nlbench.cli import compare, filter, listing, output, perf, preview, reproduce, run, saved, verify
+from nlbench.cli import compare, filter, listing, merge, output, perf, preview, reproduce, run, saved, verify
 from nlbench.errors import EnvironmentFault, Interrupted, NlbenchError
 
 HELP = """Monte Carlo benchmarks of nonlinear filters.
@@ -105,6 +105,7 @@ def common(
 
 
 app.command("run")(run.run)
+app.command("merge")(merge.merge)
 app.command("validate")(preview.validate)
 app.command("plan")(preview.plan)
 app.command("list")(listing.show)

@@ -36,6 +36,7 @@ Precision = Annotated[
         "--precision", metavar="WHAT:P%", help="Choose the runs: rms:1% is a standard error of 1 % of each."
     ),
 ]
+Gate = Annotated[bool, typer.Option("--gate", help="Exit with 3 unless every claim is confirmed.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nlbench.cli import budget, options, output
+from nlbench.cli import budget, merge, options, output
 from nlbench.errors import ConfigError
 
 if TYPE_CHECKING:
-    from nlbench.cli.progress import Progress
     from nlbench.config import Experiment
     from nlbench.config.precision import Precision
 
@@ -24,34 +22,82 @@ def run(
     seed: options.Seed = None,
     settings: options.Set = None,
     out: options.Out = Path("results"),
-    gate: Annotated[
-        bool, typer.Option("--gate", help="Exit with 3 unless every claim is confirmed.")
-    ] = False,
+    gate: options.Gate = False,
     precision: options.Precision = None,
     limit: budget.Budget = None,
     yes: budget.Yes = False,
+    dask: Annotated[
+        str | None,
+        typer.Option(
+            "--dask",
+            metavar="ADDRESS",
+            help="Compute with the workers of a dask scheduler (tcp://HOST:PORT), or with N processes (local:N).",
+        ),
+    ] = None,
+    shard: Annotated[
+        str | None,
+        typer.Option("--shard", metavar="I/N", help="Only part I of N; `merge` makes the run of them."),
+    ] = None,
     json: options.Json = False,
 ) -> None:
     """Run an experiment, or go on with one that was stopped.
 
     What was computed before is kept: a larger --runs tops up, the same command after an interruption goes on.
     """
+    chosen: dict[str, Any] = {}
     with output.errors_as_json(json):
         asked = options.precision(precision, runs)
         longest = None if yes else budget.seconds(limit)
         experiment = options.experiment(config, runs, seed, settings)
-        if gate and not experiment.claims:
-            raise ConfigError(f"{config}: --gate needs claims, and the file makes none")
-        chosen = None
+        if shard is not None:
+            if dask or gate or asked:
+                raise ConfigError("--shard goes with none of --dask, --precision and --gate")
+            division, stated = (
+                merge.divided(shard),
+                [("--runs", runs), ("--seed", seed), ("--from", str(out))],
+            )
+            words = [word for name, value in stated if value is not None for word in (name, value)]
+            command = options.command("merge", config, settings, *words)
+            merge.shard(experiment, division, out, json, computing, command)
+            return
+        gated(config, experiment, gate)
+        if dask is not None:
+            from nlbench.engine.cluster import checked
+
+            checked(dask)
         if asked is not None:
-            experiment, chosen = _chosen(experiment, out, asked, longest, quiet=json)
-        results = _computed(experiment, out, longest, quiet=json)
+            experiment, runs_chosen = _chosen(experiment, out, asked, longest, quiet=json)
+
+        def computed(show: Any) -> Any:
+            from nlbench import engine
+            from nlbench.engine.planning.space import require
+
+            check = None if longest is None else require
+            return engine.run(experiment, out, progress=show, check=check, dask=dask)
+
+        results = computing(experiment, json, computed, longest)
+        if asked is not None:
+            from nlbench.cli import summary
+
+            chosen = {"precision": summary.precision(asked, runs_chosen, experiment, results)}
+    finish(experiment, results, gate, json, chosen)
+
+
+def gated(config: Path, experiment: Experiment, gate: bool) -> None:
+    """Raise `ConfigError` where claims are to be a gate and there are none."""
+    if gate and not experiment.claims:
+        raise ConfigError(f"{config}: --gate needs claims, and the file makes none")
+
+
+def finish(
+    experiment: Experiment, results: Any, gate: bool, json: bool, more: dict[str, Any] | None = None
+) -> None:
+    """Report and print the essence, and `more` facts; raises the gravest of what makes the command fail."""
+    with output.errors_as_json(json):
         report = _reported(results)
     from nlbench.cli import summary
 
-    facts = summary.facts(experiment, results, report)
-    if asked is not None:
-        facts["precision"] = summary.precision(asked, chosen, experiment, results)
+    facts = {**summary.facts(experiment, results, report), **(more or {})}
     faults = summary.faults(experiment, facts, gate)
     if json:
         output.as_json({**facts, "exit_code": faults[0].exit_code if faults else 0})
@@ -68,36 +114,30 @@ def _chosen(
     experiment: Experiment, out: Path, asked: Precision, longest: float | None, quiet: bool
 ) -> tuple[Experiment, Any]:
     """The experiment with the runs that the precision needs, and how they were chosen."""
-    from nlbench import runtime
 
-    runtime.configure(precision=experiment.engine.precision, threads=experiment.engine.threads)
-    from nlbench.engine.planning.precision import choose
+    def choose(show: Any) -> Any:
+        from nlbench.engine.planning.precision import choose
 
-    with _watched(longest, quiet) as show:
-        chosen = choose(experiment, asked, out, show)
+        return choose(experiment, asked, out, show)
+
+    chosen = computing(experiment, quiet, choose, longest)
     counts = experiment.monte_carlo.model_copy(update={"runs": chosen.runs})
     return experiment.model_copy(update={"monte_carlo": counts}), chosen
 
 
-def _computed(experiment: Experiment, out: Path, longest: float | None, quiet: bool) -> Any:
+def computing(
+    experiment: Experiment, quiet: bool, compute: Callable[[Any], Any], longest: float | None = None
+) -> Any:
+    """What `compute` gives, called with a function that shows progress and keeps to the budget, with jax set up for
+    the experiment; SIGTERM does what Ctrl-C does."""
     from nlbench import runtime
 
     runtime.configure(precision=experiment.engine.precision, threads=experiment.engine.threads)
-    from nlbench import engine
-    from nlbench.engine.planning.space import require
-
-    with _watched(longest, quiet) as show:
-        return engine.run(experiment, out, progress=show, check=None if longest is None else require)
-
-
-@contextmanager
-def _watched(longest: float | None, quiet: bool) -> Iterator[Progress | None]:
-    """Progress that keeps to the budget, while SIGTERM does what Ctrl-C does."""
     from nlbench.cli.progress import progress
     from nlbench.cli.signals import ended_by_a_second, terminated_like_interrupted
 
     with terminated_like_interrupted(), ended_by_a_second(), progress(quiet) as show:
-        yield show if longest is None else budget.Guard(longest, show)
+        return compute(show if longest is None else budget.Guard(longest, show))
 
 
 def _reported(results: Any) -> Path:

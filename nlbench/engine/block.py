@@ -14,6 +14,7 @@ from nlbench.engine.judge import judge
 from nlbench.engine.sighting import follow_sightings
 from nlbench.simulate import Simulated, Trajectory, seed_key, simulate
 from nlbench.statistics.accumulate import block_sums
+from nlbench.statistics.share import ALL, Share
 from nlbench.statistics.tracks import Tracks
 
 if TYPE_CHECKING:
@@ -54,18 +55,18 @@ def make_chunk(
     capacity: int,
     runs: int,
     watched: tuple[int, int] = (0, 0),
+    share: Share = ALL,
 ) -> Chunk:
     """Blocks first_block ... first_block + count - 1 of `runs` runs, in arrays that hold `capacity` blocks.
 
-    watched: a block, counted from first_block, and a lane of it.
+    watched: a block, counted from first_block, and a lane of it. share: whose blocks are counted.
     """
     L = problem.block
-    numbers = np.uint64(first_block) * np.uint64(L) + np.arange(capacity * L, dtype=np.uint64).reshape(
-        capacity, L
-    )
+    blocks = share.blocks(first_block, capacity)
+    numbers = blocks[:, None] * np.uint64(L) + np.arange(L, dtype=np.uint64)
     firsts = numbers - numbers % np.uint64(problem.set_size)
     lanes = Trajectory(*words(numbers), *words(firsts), (numbers - firsts).astype(np.int32))
-    real = [min(max(runs - (first_block + place) * L, 0), L) for place in range(capacity)]
+    real = [min(max(runs - int(block) * L, 0), L) for block in blocks]
     return Chunk(lanes, np.array(real, np.int32), np.int32(count), *map(np.int32, watched))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from nlbench.engine.block import View, chunk_sums, make_chunk, words
 from nlbench.engine.program_cache import use_cache
+from nlbench.statistics.share import ALL, Share
 
 if TYPE_CHECKING:
     from nlbench.engine.problem import Problem
@@ -29,10 +30,11 @@ class Compiled(NamedTuple):
     seed: tuple[Any, Any]
     seconds: float
     program: str
+    share: Share = ALL
 
     def sums(self, first_block: int, count: int, runs: int) -> dict[str, np.ndarray]:
-        """Sums of blocks first_block ... first_block + count - 1, on the host."""
-        chunk = make_chunk(self.problem, first_block, count, CAPACITY, runs)
+        """Sums of blocks first_block ... first_block + count - 1 of the share, on the host."""
+        chunk = make_chunk(self.problem, first_block, count, CAPACITY, runs, share=self.share)
         sums, _ = self.executable(self.seed, chunk)
         # Copied, so that sums that wait to be added do not keep arrays of the full capacity.
         return {name: np.asarray(value)[:count].copy() for name, value in sums.items()}

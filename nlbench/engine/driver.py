@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nlbench import runtime
 from nlbench.config.schema import SystemSpec
 from nlbench.engine.bounds import bounds_table
+from nlbench.engine.cluster import dask_workers
 from nlbench.engine.compiled import CAPACITY, Compiled, compile_chunks
 from nlbench.engine.finish import complete, read_anew, write
 from nlbench.engine.interruption import stop_requests
 from nlbench.engine.memory import Load, memory_faults
 from nlbench.engine.problem import make
-from nlbench.engine.resume import Saver, finished_runs, resumed, sound
+from nlbench.engine.remote import Task
+from nlbench.engine.resume import Saver, finished_runs, numerics, resumed, sound
 from nlbench.engine.workers import Threads, Workers, in_order
-from nlbench.errors import Interrupted
+from nlbench.errors import ConfigError, Interrupted
 from nlbench.results.folder import RunFolder
 from nlbench.results.results import Results
 from nlbench.statistics.totals import Totals
@@ -37,10 +40,18 @@ def run(
     out: str | Path,
     progress: Progress | None = None,
     check: Check | None = None,
+    dask: str | None = None,
 ) -> Results:
-    """Compute what is missing of an experiment and write its results. `check` may raise before anything is computed."""
+    """Compute what is missing of an experiment and write its results.
+
+    check: may raise before anything is computed. dask: where its workers are, if they are not threads of this process.
+    """
+    if dask is not None and own is not None:
+        raise ConfigError(
+            "a system that exists in this process only cannot be sent to dask workers: name one"
+        )
     with stop_requests() as stopped, memory_faults():
-        return _run(experiment, own, Path(out), progress or (lambda done, total: None), stopped, check)
+        return _run(experiment, own, Path(out), progress or (lambda done, total: None), stopped, check, dask)
 
 
 def _run(
@@ -50,6 +61,7 @@ def _run(
     progress: Progress,
     stopped: Callable[[], bool],
     check: Check | None,
+    dask: str | None,
 ) -> Results:
     problem = make(experiment, own)
     compiled = None
@@ -74,11 +86,20 @@ def _run(
         folder.reopen()
         folder.write_experiment(experiment.resolved_yaml())
         chunk = experiment.engine.chunk or CAPACITY
-        with Threads(compiled, runs, threads) as workers:
+        with _workers(experiment, compiled, runs, threads, dask) as workers:
             totals = compute(compiled, folder, totals, runs, workers, chunk, progress, stopped)
         seconds = time.perf_counter() - begun
         write(folder, experiment, compiled, totals, seconds, threads, bounds)
     return Results(folder.path)
+
+
+def _workers(
+    experiment: Experiment, compiled: Compiled, runs: int, threads: int, dask: str | None
+) -> AbstractContextManager[Workers]:
+    """Threads of this process, or the workers of a cluster."""
+    if dask is None:
+        return Threads(compiled, runs, threads)
+    return dask_workers(dask, Task(experiment.resolved_yaml(), runs, tuple(numerics(compiled).items())))
 
 
 def _identified(experiment: Experiment, program: str) -> Experiment:

@@ -84,9 +84,13 @@ class Saver:
     def save(self, totals: Totals) -> None:
         """Save the totals unless they are saved."""
         if totals.blocks != self._blocks:
-            facts = {"schema": SCHEMA, "fingerprint": numerics(self._compiled)}
-            self._folder.save_checkpoint(totals.state(), **facts)
+            save(self._folder, self._compiled, totals)
             self._blocks = totals.blocks
+
+
+def save(folder: RunFolder, compiled: Compiled, totals: Totals) -> None:
+    """Make these totals the checkpoint."""
+    folder.save_checkpoint(totals.state(), schema=SCHEMA, fingerprint=numerics(compiled))
 
 
 def numerics(compiled: Compiled) -> dict[str, str]:

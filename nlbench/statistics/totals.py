@@ -1,7 +1,8 @@
 """The running totals of an experiment: block sums merged on the host, in block order, into 64 groups.
 
 Everything is float64 and of fixed size, whatever the number of runs. Power sums are moved from each block's
-mean to a pivot (the mean of the first block in which the filter is alive), which is the same for all groups.
+mean to a pivot, which is the same for all groups: the mean of block 0, and zero where block 0 lost a filter altogether.
+Totals may be those of a share of the groups; all shares of a run make those of one machine (`statistics.joined`).
 Only the last block may be padded: to top up later, keep the totals without it and add it to a copy.
 """
 
@@ -14,10 +15,11 @@ from nlbench.statistics import histogram
 from nlbench.statistics.kept import KeptRuns, Reported, magnitudes
 from nlbench.statistics.layout import GROUPS, Layout
 from nlbench.statistics.powers import shifted
+from nlbench.statistics.share import ALL, Share
 from nlbench.statistics.uncertainty import JACKKNIFE_GROUPS
 
 _ALWAYS_KEPT = 64 * JACKKNIFE_GROUPS  # so that with fewer groups the errors of all runs are at hand
-_PREFIX = "group_"
+GROUP_PREFIX = "group_"
 
 
 def _in_a_row(array: np.ndarray) -> np.ndarray:
@@ -29,18 +31,20 @@ def _in_a_row(array: np.ndarray) -> np.ndarray:
 class Totals:
     """Sums per group, histograms of |error| and kept errors; grows only by `add`."""
 
-    def __init__(self, layout: Layout):
+    def __init__(self, layout: Layout, share: Share = ALL, lanes: int = 1):
+        """share: the groups whose blocks are added. lanes: runs of a block, which count where not all groups are."""
         shape = (len(layout.filters), len(layout.times), len(layout.coordinates))
         self.layout = layout
+        self.share, self._lanes = share, lanes
         self.blocks = 0
         self.runs = 0
         self.groups: dict[str, np.ndarray] = {}
         self.pivot = np.zeros((3, *shape))  # of error, variance and third
         bins = (shape[0], len(layout.reports), len(layout.magnitudes), histogram.BINS)
         self.histogram = np.zeros(bins, np.int64)
-        self.kept = KeptRuns(layout, max(layout.keep_runs, _ALWAYS_KEPT))
+        self.kept = KeptRuns(layout, share.runs(max(layout.keep_runs, _ALWAYS_KEPT), lanes))
+        self.centred = False  # whether the pivot is known
         self._padded = False
-        self._pivot_set = np.zeros(shape[:2], bool)
         self._scale = np.array(layout.scale)[:, None]
         self._bin_offset = np.arange(np.prod(bins[:-1])).reshape(*bins[:-1], 1) * histogram.BINS
         self._reports = np.array(layout.reports)
@@ -51,15 +55,24 @@ class Totals:
     def add(self, first: int, sums: Mapping[str, Any]) -> None:
         """Add the sums of blocks first, first + 1, ..., stacked along a leading axis; `first` must be the next block.
 
-        The result is the same, to the last bit, however the blocks are split over calls.
+        Of a share these are places (`Share`), and one without block 0 needs `centre` first. The result is the same, to
+        the last bit, however the blocks are split over calls.
         """
         if first != self.blocks:
             raise ValueError(
                 f"block {first} came when block {self.blocks} was due: blocks are added in order"
             )
         count = len(sums["total"])
-        for start in range(0, count, GROUPS):  # no two blocks of a part are of the same group
-            self._add({name: np.asarray(value)[start : start + GROUPS] for name, value in sums.items()})
+        most = len(self.share.groups)
+        for start in range(0, count, most):  # no two blocks of a part are of the same group
+            self._add({name: np.asarray(value)[start : start + most] for name, value in sums.items()})
+
+    def centre(self, sums: Mapping[str, Any]) -> None:
+        """Take the pivot from the sums of blocks of which the first is block 0 of the run, unless it is known."""
+        if not self.centred:
+            alive = np.asarray(sums["alive"])[0] > 0
+            self.pivot[:, alive] = np.asarray(sums["mean"])[0].astype(np.float64)[:, alive]
+            self.centred = True
 
     def _add(self, host: dict[str, np.ndarray]) -> None:
         given = Reported(*(host.pop(f"report_{name}") for name in Reported._fields))
@@ -68,10 +81,14 @@ class Totals:
             raise ValueError(
                 "a block after a padded one: add a padded block last, and to a copy of the totals only"
             )
+        if self.share.number == 0:
+            self.centre(host)
+        elif not self.centred:
+            raise ValueError("a share without block 0 must be told the pivot before blocks are added")
         moved = self._move_to_pivot(host)
         if not self.groups:
             self.groups = {name: np.zeros((GROUPS, *value.shape[1:])) for name, value in moved.items()}
-        group = (self.blocks + np.arange(len(real))) % GROUPS
+        group = self.share.groups[(self.blocks + np.arange(len(real))) % len(self.share.groups)]
         for name, value in moved.items():
             self.groups[name][group] += value
         runs = int(real.sum())
@@ -84,12 +101,6 @@ class Totals:
         """The blocks' sums with all powers of error, variance and third about the pivot."""
         mean, power = sums.pop("mean").astype(np.float64), sums.pop("power")
         alive = sums["alive"][..., None].astype(np.float64)
-        for block in range(len(mean)):
-            if self._pivot_set.all():
-                break
-            fresh = ~self._pivot_set & (sums["alive"][block] > 0)
-            self.pivot[:, fresh] = mean[block][:, fresh]
-            self._pivot_set |= fresh
         shift = np.where(alive[:, None] > 0, mean - self.pivot, 0.0)
         # Sums of d^0 ... d^6; that of d is zero about the mean.
         about = np.zeros((7, len(mean), *power.shape[2:]))
@@ -140,22 +151,26 @@ class Totals:
         return {
             "counters": np.array([self.blocks, self.runs, self._padded], np.int64),
             "pivot": self.pivot.copy(),
-            "pivot_set": self._pivot_set.copy(),
+            "pivot_set": np.array(self.centred),
+            "share": np.array((*self.share, self._lanes), np.int64),
             "histogram": self.histogram.copy(),
             **self.kept.state(),
-            **{_PREFIX + name: value.copy() for name, value in self.groups.items()},
+            **{GROUP_PREFIX + name: value.copy() for name, value in self.groups.items()},
         }
 
     @classmethod
     def from_state(cls, layout: Layout, state: Mapping[str, np.ndarray]) -> "Totals":
         """The totals that `state` was taken from."""
-        totals = cls(layout)
+        number, of, lanes = (int(value) for value in state.get("share", (*ALL, 1)))
+        totals = cls(layout, Share(number, of), lanes)
         totals.blocks, totals.runs = (int(value) for value in state["counters"][:2])
         totals._padded = bool(state["counters"][2])
-        totals.pivot, totals._pivot_set = state["pivot"].copy(), state["pivot_set"].copy()
+        totals.pivot, totals.centred = state["pivot"].copy(), bool(state["pivot_set"].any())
         totals.histogram = state["histogram"].copy()
         totals.kept.restore(state)
-        totals.groups = {k.removeprefix(_PREFIX): v.copy() for k, v in state.items() if k.startswith(_PREFIX)}
+        totals.groups = {
+            k.removeprefix(GROUP_PREFIX): v.copy() for k, v in state.items() if k.startswith(GROUP_PREFIX)
+        }
         return totals
 
     def copy(self) -> "Totals":

@@ -138,7 +138,7 @@ def test_json_is_one_document_in_which_nan_is_null(invoke):
 def test_options_reach_the_experiment(invoke, monkeypatch, tmp_path):
     seen = {}
 
-    def run(experiment, out, progress, check):
+    def run(experiment, out, progress, check, dask):
         seen.update(experiment=experiment, out=out)
         raise KeyboardInterrupt
 

@@ -1,0 +1,80 @@
+"""What runs in a worker process of a cluster: the program, made once from the experiment, and calls of it.
+
+Digits do not depend on who computes a block as long as everything that decides them is the same; a worker on which
+anything differs refuses, so that nothing is ever mixed.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from nlbench.errors import EnvironmentFault
+
+if TYPE_CHECKING:
+    from nlbench.engine.compiled import Compiled
+    from nlbench.engine.workers import Part
+
+PROGRAMS = 4  # kept in a worker process, for a cluster that is used again
+_one_builds = threading.Lock()
+
+
+class Task(NamedTuple):
+    """What all calls of a run share: the resolved experiment (YAML), its number of runs, and what decides digits
+    where the results are merged (`resume.numerics`)."""
+
+    experiment: str
+    runs: int
+    numerics: tuple[tuple[str, str], ...]
+
+
+def compute(task: Task, first: int, count: int) -> Part:
+    """Sums of blocks first ... first + count - 1. Raises `EnvironmentFault` where digits could differ."""
+    with _one_builds:
+        compiled = _compiled(task.experiment)
+    _refuse_differences(compiled, dict(task.numerics))
+    from nlbench.engine.workers import Part
+
+    begun = time.perf_counter()
+    sums = compiled.sums(first, count, task.runs)
+    return Part(sums, time.perf_counter() - begun)
+
+
+@lru_cache(PROGRAMS)
+def _compiled(text: str) -> Compiled:
+    from nlbench import config, runtime
+    from nlbench.config.document import compose
+
+    experiment = config.from_dict(compose(text, "the experiment").data)
+    runtime.configure(precision=experiment.engine.precision)
+    from nlbench.engine.compiled import compile_chunks
+    from nlbench.engine.problem import make
+
+    return compile_chunks(make(experiment), experiment.monte_carlo.seed)
+
+
+def _refuse_differences(compiled: Compiled, expected: dict[str, str]) -> None:
+    import socket
+
+    from nlbench.engine.resume import numerics
+
+    mine = numerics(compiled)
+    differing = [
+        f"{name}: {mine.get(name)} there, {expected.get(name)} here"
+        for name in sorted({*mine, *expected})
+        if mine.get(name) != expected.get(name)
+    ]
+    if differing:
+        raise EnvironmentFault(
+            f"the worker on {socket.gethostname()} has other software or hardware ({'; '.join(differing)}), which "
+            "would change digits: use workers of one kind and the same environment as here"
+        )
+
+
+def dask_setup(worker: Any) -> None:
+    """As a preload of local workers: a Ctrl-C in the terminal is the business of the run alone, which then stops in
+    order."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
