@@ -13,6 +13,7 @@ def validate(
     runs: options.Runs = None,
     seed: options.Seed = None,
     settings: options.Set = None,
+    plugins: options.Plugin = None,
     json: options.Json = False,
 ) -> None:
     """Check an experiment file; say everything that is wrong with it."""
@@ -48,6 +49,7 @@ def plan(
     runs: options.Runs = None,
     seed: options.Seed = None,
     settings: options.Set = None,
+    plugins: options.Plugin = None,
     json: options.Json = False,
 ) -> None:
     """Say what a run costs: time, memory, disk."""

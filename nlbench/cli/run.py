@@ -16,6 +16,7 @@ def run(
     runs: options.Runs = None,
     seed: options.Seed = None,
     settings: options.Set = None,
+    plugins: options.Plugin = None,
     out: options.Out = Path("results"),
     gate: Annotated[
         bool, typer.Option("--gate", help="Exit with 3 unless every claim is confirmed.")
