@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from nlbench.cli import filter, listing, output, preview, reproduce, run, saved
+from nlbench.cli import filter, listing, new, output, preview, reproduce, run, saved
 from nlbench.errors import EnvironmentFault, Interrupted, NlbenchError
 
 HELP = """Monte Carlo benchmarks of nonlinear filters.
@@ -112,4 +112,5 @@ app.command("report")(saved.report)
 app.command("replay")(saved.replay)
 app.command("reproduce")(reproduce.reproduce)
 app.command("filter")(filter.filter_recorded)
+app.command("new")(new.new)
 app.command("doctor")(preview.doctor)

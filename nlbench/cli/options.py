@@ -60,7 +60,12 @@ def experiment(config: Path, runs: str | None, seed: str | None, settings: list[
         overrides.append(Override("monte_carlo.runs", runs, "--runs"))
     if seed is not None:
         overrides.append(Override("monte_carlo.seed", seed, "--seed"))
-    return load(config, overrides)
+    stated = load(config, overrides)
+    if stated.plugins:  # code that nobody has tried yet
+        from nlbench import engine
+
+        engine.check(stated)
+    return stated
 
 
 def folder(experiment: Experiment, out: Path) -> Path:

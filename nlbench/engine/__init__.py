@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["plan", "replay", "run"]
+__all__ = ["check", "plan", "replay", "run"]
 
 
 def run(experiment: Any, out: Any = None, progress: Any = None) -> Any:
@@ -26,6 +26,13 @@ def plan(experiment: Any) -> dict[str, Any]:
     from nlbench.engine.estimate import plan
 
     return plan(*_stated(experiment))
+
+
+def check(experiment: Any) -> None:
+    """Raises `ConfigError` with what only shows when systems and filters are made, such as shapes that do not fit."""
+    from nlbench.engine.problem import make
+
+    make(*_stated(experiment))
 
 
 def replay(experiment: Any, label: str, trajectory: int) -> Any:

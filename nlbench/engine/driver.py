@@ -14,7 +14,7 @@ from nlbench.engine.compiled import CAPACITY, Compiled, compile_chunks
 from nlbench.engine.finish import read_anew, traced, write
 from nlbench.engine.interruption import stop_requests
 from nlbench.engine.problem import make
-from nlbench.engine.resume import checkpoint, finished_runs, resumed, sound
+from nlbench.engine.resume import checkpoint, finished_runs, resumed, same_program, sound
 from nlbench.engine.workers import Threads, Workers, in_order
 from nlbench.errors import Interrupted
 from nlbench.results.folder import RunFolder
@@ -51,14 +51,17 @@ def _run(
 ) -> Results:
     problem = make(experiment, own)
     compiled = None
-    if own is not None:  # what tells its results from those of another system is the program itself
+    if own is not None or experiment.plugins:
         compiled = compile_chunks(problem, experiment.monte_carlo.seed)
+    if own is not None and compiled:  # what tells its results from those of another system is the program itself
         experiment = _identified(experiment, compiled.program)
     folder = RunFolder(out / experiment.experiment / experiment.hash12())
     with folder.locked():
         done = finished_runs(folder)
         runs = max(experiment.monte_carlo.runs, done or 0)
         if done == runs and sound(folder) and traced(folder, experiment):
+            if experiment.plugins and compiled:
+                same_program(folder, compiled)
             read_anew(folder, experiment)
             return Results(folder.path)
         begun = time.perf_counter()

@@ -55,6 +55,19 @@ def resumed(folder: RunFolder, compiled: Compiled) -> Totals:
     return Totals.from_state(compiled.problem.layout, arrays)
 
 
+def same_program(folder: RunFolder, compiled: Compiled) -> None:
+    """Raises `EnvironmentFault` if a finished run was computed by another program.
+
+    The source of a plug-in, which is part of the run's name, does not hold what it imports or reads.
+    """
+    made_by = Results(folder.path).manifest["fingerprint"].get("program")
+    if made_by != compiled.program:
+        raise EnvironmentFault(
+            f"{folder.path} was computed by another program, though the plug-in is the same: something that it imports "
+            "or reads has changed, or the software; choose another folder with --out, or delete that one"
+        )
+
+
 def checkpoint(folder: RunFolder, compiled: Compiled, totals: Totals) -> None:
     """Save the totals of the blocks so far."""
     folder.save_checkpoint(totals.state(), fingerprint=numerics(compiled))
