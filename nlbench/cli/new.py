@@ -53,7 +53,13 @@ def new(
     if what is What.experiment:
         worse, better = _compared(system, filters or [])
         listed = list(dict.fromkeys([worse, better, *(filters or [])]))
-        values = {"NAME": dashed, "SYSTEM": system, "FILTERS": ", ".join(listed), "BETTER": better, "WORSE": worse}
+        values = {
+            "NAME": dashed,
+            "SYSTEM": system,
+            "FILTERS": ", ".join(listed),
+            "BETTER": better,
+            "WORSE": worse,
+        }
         path = Path(f"{word}.yaml")
     else:
         _check_free(what, dashed)

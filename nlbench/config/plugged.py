@@ -77,7 +77,9 @@ def _absent(given: Any, at_hand: dict[str, Any]) -> list[Finding]:
         spec, wrong = validated(PluginSpec, each, ("plugins", index))
         findings += wrong
         if spec and spec.digest not in at_hand:
-            message = f"made with other code of {spec.file} than is at hand; to run today's, leave the key out"
+            message = (
+                f"made with other code of {spec.file} than is at hand; to run today's, leave the key out"
+            )
             findings.append(Finding(("plugins", index, "digest"), message))
     return findings
 

@@ -53,7 +53,9 @@ def _run(
     compiled = None
     if own is not None or experiment.plugins:
         compiled = compile_chunks(problem, experiment.monte_carlo.seed)
-    if own is not None and compiled:  # what tells its results from those of another system is the program itself
+    if (
+        own is not None and compiled
+    ):  # what tells its results from those of another system is the program itself
         experiment = _identified(experiment, compiled.program)
     folder = RunFolder(out / experiment.experiment / experiment.hash12())
     with folder.locked():

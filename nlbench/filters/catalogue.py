@@ -217,7 +217,7 @@ TAKEN = {
     "discrete": [(False, False), (True, False)],
     "baseline": list(KINDS),
     "reference": list(KINDS),
-    "plugin": list(KINDS),  # or as its factory says
+    "plugin": [(False, False), (True, False)],  # or fewer: its factory may refuse a system
 }
 
 

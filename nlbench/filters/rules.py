@@ -74,7 +74,9 @@ def _sampled(system: System | DiscreteSystem) -> Iterator[str]:
         yield from _of_shape("sample(key)", lambda: jax.eval_shape(system.sample, jax.random.key(0)), (n,))
 
 
-def returned(name: str, function: Callable, takes: tuple[Any, ...], expected: tuple[int, ...]) -> Iterator[str]:
+def returned(
+    name: str, function: Callable, takes: tuple[Any, ...], expected: tuple[int, ...]
+) -> Iterator[str]:
     """What is wrong with the shape that function returns for arrays of the shapes `takes` (a number: a vector)."""
     arrays = [jnp.zeros(each) for each in takes]
     yield from _of_shape(name, lambda: jax.eval_shape(lambda *x: _array(function(*x)), *arrays), expected)
@@ -92,4 +94,8 @@ def _of_shape(name: str, shaped: Callable[[], Any], expected: tuple[int, ...]) -
 
 
 def _array(value: Any) -> Any:
-    return jnp.stack([jnp.asarray(part) for part in value]) if isinstance(value, (tuple, list)) else jnp.asarray(value)
+    return (
+        jnp.stack([jnp.asarray(part) for part in value])
+        if isinstance(value, (tuple, list))
+        else jnp.asarray(value)
+    )

@@ -76,8 +76,8 @@ def find(kind: Kind, name: str) -> tuple[Plugin, Entry] | None:
     for plugin in (*_standing_in, *_allowed.values()):
         if name in plugin.entries(kind):
             return plugin, plugin.entries(kind)[name]
-    plugin = installed.find(kind, name)
-    return None if plugin is None else (plugin, plugin.entries(kind)[name])
+    there = installed.find(kind, name)
+    return None if there is None else (there, there.entries(kind)[name])
 
 
 def hint(name: str) -> str:
@@ -99,7 +99,9 @@ def restore(wanted: Sequence[Any]) -> None:
         if spec.digest in _allowed or installed.has(spec.digest):
             continue
         if not spec.source:
-            raise ConfigError(f"this experiment needs the plug-in {spec.file}: allow it with --plugin {spec.file}")
+            raise ConfigError(
+                f"this experiment needs the plug-in {spec.file}: allow it with --plugin {spec.file}"
+            )
         _register(source.executed(spec.source, spec.path))
 
 
@@ -127,9 +129,9 @@ def _free(plugin: Plugin, taken: Mapping[Kind, Collection[str]]) -> Plugin:
         for name in plugin.entries(kind):
             if name in taken[kind]:
                 raise ConfigError(f"{plugin.path}: {kind}: '{name}' is a built-in name; choose another")
-            other = next((p for p in _allowed.values() if name in p.entries(kind) and p.path != plugin.path), None)
+            other = next(
+                (p for p in _allowed.values() if name in p.entries(kind) and p.path != plugin.path), None
+            )
             if other is not None:
                 raise ConfigError(f"{plugin.path}: {kind}: '{name}' is already that of {other.path}")
     return plugin
-
-

@@ -52,7 +52,9 @@ def _loaded(kind: Kind, name: str, point: EntryPoint) -> Plugin:
         raise ConfigError([trouble.located(error, where, "importing it failed")]) from None
     entry = {name: entry_of(factory, kind, name, where)}
     systems, filters = (entry, {}) if kind == "systems" else ({}, entry)
-    return Plugin(point.dist.name if point.dist else point.module, _digest(point), where, "", systems, filters)
+    return Plugin(
+        point.dist.name if point.dist else point.module, _digest(point), where, "", systems, filters
+    )
 
 
 @cache

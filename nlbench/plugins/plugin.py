@@ -69,7 +69,8 @@ def stand_in(spec: Any) -> Plugin:
 
     says = f"of the plug-in {spec.file}"
     systems = {
-        name: Entry(says, Anything, refuse, (kind.discrete, kind.continuous)) for name, kind in spec.systems.items()
+        name: Entry(says, Anything, refuse, (kind.discrete, kind.continuous))
+        for name, kind in spec.systems.items()
     }
     filters = {name: Entry(says, Anything, refuse) for name in spec.filters}
     return Plugin(spec.file, spec.digest, spec.file, "", systems, filters)

@@ -14,7 +14,10 @@ from nlbench.row import StrictOptions
 
 # What the engine tells every filter; a factory that has no use for them need not take them.
 TOLD: dict[str, Any] = {
-    "step": (PositiveFloat | None, Field(default=None, description="integration step; default: the experiment's")),
+    "step": (
+        PositiveFloat | None,
+        Field(default=None, description="integration step; default: the experiment's"),
+    ),
     "missing": (bool, Field(default=True, description="whether measurements may be NaN, meaning not taken")),
 }
 TAKES = {

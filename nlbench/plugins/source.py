@@ -18,7 +18,10 @@ from nlbench.suggestions import suggestion
 
 NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 DECLARATIONS: dict[str, Kind] = {"SYSTEMS": "systems", "FILTERS": "filters"}
-EXAMPLE = {"SYSTEMS": 'SYSTEMS = {"van-der-pol": van_der_pol}', "FILTERS": 'FILTERS = {"my-filter": my_filter}'}
+EXAMPLE = {
+    "SYSTEMS": 'SYSTEMS = {"van-der-pol": van_der_pol}',
+    "FILTERS": 'FILTERS = {"my-filter": my_filter}',
+}
 
 
 def of_file(path: str | Path) -> Plugin:
@@ -64,14 +67,18 @@ def declared(module: Any, path: str) -> tuple[dict[str, Entry], dict[str, Entry]
     if not any(hasattr(module, name) for name in DECLARATIONS):
         near = [name for name in vars(module) if name.lower() in ("system", "filter", "systems", "filters")]
         found = f" (found '{near[0]}')" if near else ""
-        message = f"declares nothing{found}; expected a line such as {EXAMPLE['SYSTEMS']} or {EXAMPLE['FILTERS']}"
+        message = (
+            f"declares nothing{found}; expected a line such as {EXAMPLE['SYSTEMS']} or {EXAMPLE['FILTERS']}"
+        )
         raise ConfigError([Problem(message, file=path)])
     entries: dict[Kind, dict[str, Entry]] = {"systems": {}, "filters": {}}
     problems = []
     for declaration, kind in DECLARATIONS.items():
         given = getattr(module, declaration, {})
         if not isinstance(given, dict):
-            message = f"{declaration}: expected a dict such as {EXAMPLE[declaration]}, found {type(given).__name__}"
+            message = (
+                f"{declaration}: expected a dict such as {EXAMPLE[declaration]}, found {type(given).__name__}"
+            )
             problems.append(Problem(message, file=path))
             continue
         for name, factory in given.items():

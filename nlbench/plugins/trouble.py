@@ -14,7 +14,9 @@ def located(error: BaseException, path: str, step: str) -> Problem:
     """
     if isinstance(error, SyntaxError) and error.filename == path:
         line = (error.text or "").rstrip("\n")
-        return Problem(f"{step}: {type(error).__name__}: {error.msg}", "", path, error.lineno, error.offset or 1, line)
+        return Problem(
+            f"{step}: {type(error).__name__}: {error.msg}", "", path, error.lineno, error.offset or 1, line
+        )
     own = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == path]
     said = " ".join(str(error).split())
     message = f"{step}: {type(error).__name__}{said and ': '}{said[:200]}"

@@ -108,7 +108,9 @@ def _plugged(name: str, plugin: plugins.Plugin, entry: plugins.Entry) -> Any:
 
         system = plugins.made(plugin, what, entry, parameters)
         if not isinstance(system, (System, DiscreteSystem)):
-            message = f"{what}: made a {type(system).__name__}, expected a nlbench.System or nlbench.DiscreteSystem"
+            message = (
+                f"{what}: made a {type(system).__name__}, expected a nlbench.System or nlbench.DiscreteSystem"
+            )
             raise ConfigError([Problem(message, file=plugin.path)])
         return system
 
