@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Results(results.Results):
-    """A finished run, from its folder: `table(name)`, `tables`, `claims`, `plot()`, `manifest`, `experiment`, `path`.
+    """A finished run, from its folder: `table(name)`, `tables`, `claims`, `plot()`, `report()`, `manifest`, `experiment`, `path`.
 
     At the end of a notebook's cell it shows itself: errors with standard errors, diverged runs, verdicts.
     """
@@ -37,6 +37,12 @@ class Results(results.Results):
     def claims(self) -> pd.DataFrame | None:
         """The verdict on each claim; None where the experiment makes none."""
         return self.table("claims") if "claims" in self.tables else None
+
+    def report(self) -> Path:
+        """Draw all figures and write `report.html`, one page that needs no network. Returns its path."""
+        from nlbench import report
+
+        return report.write(self)
 
     def plot(
         self, kind: str = "rms", coordinate: str | None = None, filters: Sequence[str] | None = None

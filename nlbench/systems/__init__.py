@@ -66,8 +66,8 @@ def kind(name: str, parameters: Mapping[str, Any]) -> Kind:
     from nlbench.systems.system import Kind
 
     module = _module(name)
-    if hasattr(module, "kind"):
-        return Kind(*module.kind(parameters))
+    if isinstance(module, SimpleNamespace):
+        return Kind(*module.kind_of(parameters))
     return Kind(
         discrete=getattr(module, "TIME", parameters.get("time")) == "discrete",
         continuous=getattr(module, "MEASUREMENT", parameters.get("measurement")) == "continuous",
@@ -114,10 +114,10 @@ def _plugged(name: str, plugin: plugins.Plugin, entry: plugins.Entry) -> Any:
             raise ConfigError([Problem(message, file=plugin.path)])
         return system
 
-    def kind(parameters: Mapping[str, Any]) -> tuple[bool, bool]:
+    def kind_of(parameters: Mapping[str, Any]) -> tuple[bool, bool]:
         from nlbench.checks import checked
-        from nlbench.systems.system import kind as kind_of
+        from nlbench.systems.system import kind
 
-        return entry.kind or kind_of(build(checked(entry.parameters, parameters, where=name)))
+        return entry.kind or kind(build(checked(entry.parameters, parameters, where=name)))
 
-    return SimpleNamespace(SUMMARY=entry.summary, Parameters=entry.parameters, build=build, kind=kind)
+    return SimpleNamespace(SUMMARY=entry.summary, Parameters=entry.parameters, build=build, kind_of=kind_of)
