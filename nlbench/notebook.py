@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 
 
 class Results(results.Results):
-    """A finished run, from its folder: `table(name)`, `tables`, `claims`, `plot()`, `report()`, `manifest`, `experiment`, `path`.
+    """A finished run, from its folder.
 
-    At the end of a notebook's cell it shows itself: errors with standard errors, diverged runs, verdicts.
+    `table(name)`, `tables`, `claims`, `plot()`, `report()`, `manifest`, `experiment`, `path` are what it has. At the
+    end of a notebook's cell it shows itself: errors with standard errors, diverged runs, verdicts.
     """
 
     def __repr__(self) -> str:

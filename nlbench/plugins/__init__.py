@@ -64,7 +64,7 @@ def files() -> tuple[str, ...]:
 
 def names(kind: Kind) -> tuple[str, ...]:
     """Names of the systems or filters that plug-ins bring; what is only installed is not imported for it."""
-    own = [name for plugin in _allowed.values() for name in plugin.entries(kind)]
+    own = [name for plugin in (*_standing_in, *_allowed.values()) for name in plugin.entries(kind)]
     return tuple(dict.fromkeys([*own, *installed.names(kind)]))
 
 
