@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 def brief(results: Results) -> str:
     """The essence of a run as a fragment of HTML, for a cell of a notebook."""
-    from nlbench.report import brief as fragment
+    from nlbench.report import fragment
 
     return fragment.brief(results)
 

@@ -74,7 +74,7 @@ def test_a_figure_has_the_curves_of_the_table_and_nothing_is_written(results):
 
 
 def test_the_first_coordinate_is_drawn_where_none_is_named(results):
-    assert "angle" in results.plot().axes[0].get_title()
+    assert "angle" in results.plot().axes[0].get_title(loc="left")
 
 
 @pytest.mark.parametrize(
