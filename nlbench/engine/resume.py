@@ -60,11 +60,12 @@ def same_program(folder: RunFolder, compiled: Compiled) -> None:
 
     The source of a plug-in, which is part of the run's name, does not hold what it imports or reads.
     """
-    made_by = Results(folder.path).manifest["fingerprint"].get("program")
-    if made_by != compiled.program:
+    then, now = Results(folder.path).manifest["fingerprint"], numerics(compiled)
+    # Other software may make another program of the same plug-in, and the results are as good as ever.
+    if then != now and then == {**now, "program": then.get("program")}:
         raise EnvironmentFault(
             f"{folder.path} was computed by another program, though the plug-in is the same: something that it imports "
-            "or reads has changed, or the software; choose another folder with --out, or delete that one"
+            "or reads has changed; choose another folder with --out, or delete that one"
         )
 
 
