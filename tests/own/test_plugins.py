@@ -180,6 +180,11 @@ def test_a_broken_plugin_is_one_clear_line_before_anything_is_compiled(case, mon
     assert len([line for line in said.splitlines() if not line.startswith("    ")]) == 1
 
 
+def test_validate_says_what_shape_does_not_fit():
+    Path("walk.py").write_text(BROKEN["drift"][0])
+    assert problems("validate", "own.yaml", "--plugin", "walk.py") == f"{BROKEN['drift'][1]}\n"
+
+
 UNFIT = {
     "return 3": "filter 'mine': made a int, expected a nlbench.filters.filter.Filter",
     "return made._replace(init=lambda m, key=None: 1 / 0)": "init(moments): raises ZeroDivisionError",
