@@ -21,8 +21,8 @@ def unknown(name: str, what: str, is_known: Callable[[str], bool], known: Iterab
     except ConfigError as error:
         return str(error)
     known = list(known)
-    said = f"unknown {what} '{name}'{suggestion(name, known)}"
-    return said if closest(name, known) else said + plugins.hint(name)
+    hint = "" if closest(name, known) else plugins.hint(name)
+    return f"unknown {what} '{name}'{hint}{suggestion(name, known)}"
 
 
 def broken(name: str, parameters: dict[str, Any]) -> list[str]:
