@@ -49,7 +49,6 @@ def entry_of(factory: Any, kind: Kind, name: str, path: str) -> Entry:
     told = TOLD if kind == "filters" else {}
     missing = {key: value for key, value in told.items() if key not in model.model_fields}
     full = create_model(model.__name__, __base__=model, **missing) if missing else model
-    # Without the docstring, pydantic's own words on models would stand here.
     summary = (inspect.getdoc(factory) or "").split("\n")[0] or f"of {path}"
     return Entry(summary, full, _called(factory, [each.name for each in own], takes_model))
 
