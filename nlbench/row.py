@@ -27,4 +27,4 @@ class Row(NamedTuple):
     order: int
     update: str
     options: type[BaseModel]
-    family: Literal["moment", "continuous", "discrete", "baseline", "reference"] = "moment"
+    family: Literal["moment", "continuous", "discrete", "baseline", "reference", "plugin"] = "moment"

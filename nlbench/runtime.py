@@ -49,6 +49,13 @@ def configure(precision: str = "float64", threads: int | None = None) -> None:
         _chosen["threads"] = threads
 
 
+def prepare() -> None:
+    """Be ready for code that computes before an experiment has chosen a precision: XLA's options, and float64."""
+    if not backend_started():
+        _set_options()
+    ensure_precision()
+
+
 def ensure_precision() -> None:
     """float64, unless `configure` chose otherwise."""
     if "precision" not in _chosen:

@@ -8,7 +8,20 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from nlbench.cli import compare, filter, listing, merge, output, perf, preview, reproduce, run, saved, verify
+from nlbench.cli import (
+    compare,
+    filter,
+    listing,
+    merge,
+    new,
+    output,
+    perf,
+    preview,
+    reproduce,
+    run,
+    saved,
+    verify,
+)
 from nlbench.errors import EnvironmentFault, Interrupted, NlbenchError
 
 HELP = """Monte Carlo benchmarks of nonlinear filters.
@@ -116,4 +129,5 @@ app.command("reproduce")(reproduce.reproduce)
 app.command("compare")(compare.compare)
 app.command("filter")(filter.filter_recorded)
 app.command("perf")(perf.perf)
+app.command("new")(new.new)
 app.command("doctor")(preview.doctor)

@@ -40,6 +40,7 @@ def filter_recorded(
     start: Annotated[float, typer.Option("--start", metavar="T", help="Time of the initial moments.")] = 0.0,
     seed: options.Seed = None,
     settings: options.Set = None,
+    plugins: options.Plugin = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Write the CSV here instead of printing it.")
     ] = None,

@@ -31,6 +31,7 @@ def show(
     folder: Annotated[
         Path, typer.Option("--configs", metavar="DIR", help="Folder of the experiments.")
     ] = Path("configs"),
+    plugins: options.Plugin = None,
     json: options.Json = False,
 ) -> None:
     """List systems, filters or experiments.

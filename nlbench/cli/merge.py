@@ -29,6 +29,7 @@ def merge(
     settings: options.Set = None,
     out: options.Out = Path("results"),
     gate: options.Gate = False,
+    plugins: options.Plugin = None,
     json: options.Json = False,
 ) -> None:
     """Make the run of which all shards were computed with `run --shard`, byte for byte that of one machine."""

@@ -40,6 +40,31 @@ Gate = Annotated[bool, typer.Option("--gate", help="Exit with 3 unless every cla
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 
 
+def _allow(paths: list[Path] | None) -> list[Path] | None:
+    """Have exactly these plug-ins; called before the command."""
+    from nlbench import plugins
+
+    plugins.forget()
+    if paths:
+        from nlbench.config import allow
+
+        allow(*paths)
+    return paths
+
+
+# Only what stands here is allowed to run, so a command need not look at it again.
+Plugin = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--plugin",
+        metavar="FILE.py",
+        callback=_allow,
+        is_eager=True,
+        help="Run this Python file, for the systems and filters that it declares; repeatable.",
+    ),
+]
+
+
 def experiment(config: Path, runs: str | None, seed: str | None, settings: list[str] | None) -> Experiment:
     """The experiment in the file with the options of the command line put in. Raises `ConfigError`."""
     from nlbench.config import Override, load
@@ -49,7 +74,12 @@ def experiment(config: Path, runs: str | None, seed: str | None, settings: list[
         overrides.append(Override("monte_carlo.runs", runs, "--runs"))
     if seed is not None:
         overrides.append(Override("monte_carlo.seed", seed, "--seed"))
-    return load(config, overrides)
+    stated = load(config, overrides)
+    if stated.plugins:  # code that nobody has tried yet
+        from nlbench import engine
+
+        engine.check(stated)
+    return stated
 
 
 def precision(text: str | None, runs: str | None) -> PrecisionAsked | None:
@@ -71,7 +101,11 @@ def command(name: str, config: Path, settings: list[str] | None, *options: str) 
     """A command line that the user can paste: the same file and settings, another command."""
     import shlex
 
+    from nlbench import plugins
+
     words = ["nlbench", name, str(config), *options]
+    for path in plugins.files():
+        words += ["--plugin", path]
     for each in settings or []:
         words += ["--set", each]
     return shlex.join(words)

@@ -31,6 +31,7 @@ def perf(
         str, typer.Option("--budget", metavar="P%", help="How much slower a workload may become.")
     ] = "25%",
     record: Annotated[bool, typer.Option("--record", help="Write the baseline.")] = False,
+    plugins: options.Plugin = None,
     json: options.Json = False,
 ) -> None:
     """Time the filters against a frozen kernel, and compare with a baseline.

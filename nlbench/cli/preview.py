@@ -13,6 +13,7 @@ def validate(
     runs: options.Runs = None,
     seed: options.Seed = None,
     settings: options.Set = None,
+    plugins: options.Plugin = None,
     json: options.Json = False,
 ) -> None:
     """Check an experiment file; say everything that is wrong with it."""
@@ -50,6 +51,7 @@ def plan(
     settings: options.Set = None,
     out: options.Out = Path("results"),
     precision: options.Precision = None,
+    plugins: options.Plugin = None,
     json: options.Json = False,
 ) -> None:
     """Say what a run costs, or what is left of it: time, memory, disk."""

@@ -21,6 +21,7 @@ def run(
     runs: options.Runs = None,
     seed: options.Seed = None,
     settings: options.Set = None,
+    plugins: options.Plugin = None,
     out: options.Out = Path("results"),
     gate: options.Gate = False,
     precision: options.Precision = None,

@@ -14,6 +14,7 @@ from nlbench.errors import ConfigError
 def report(
     where: options.Where,
     settings: options.Set = None,
+    plugins: options.Plugin = None,
     out: options.Out = Path("results"),
 ) -> None:
     """Draw figures and write the report from saved tables."""
@@ -53,6 +54,7 @@ def replay(
     ],
     seed: options.Seed = None,
     settings: options.Set = None,
+    plugins: options.Plugin = None,
     csv: Annotated[
         Path | None, typer.Option("--csv", metavar="FILE", help="Write a CSV file instead of printing.")
     ] = None,

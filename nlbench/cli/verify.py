@@ -19,6 +19,7 @@ def verify(
     ] = None,
     settings: options.Set = None,
     out: options.Out = Path("results"),
+    plugins: options.Plugin = None,
     json: options.Json = False,
 ) -> None:
     """Check the results of a run.

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import Field
 
-from nlbench.config import consistency
+from nlbench.config import consistency, plugged
 from nlbench.config.claim import Claim
 from nlbench.config.explain import Finding, found, plain, validated
 from nlbench.config.fields import Label, Section
@@ -25,6 +25,7 @@ from nlbench.config.schema import (
     SystemSpec,
     TimeSpec,
 )
+from nlbench.errors import ConfigError
 from nlbench.filters import catalogue
 from nlbench.suggestions import closest, suggestion
 
@@ -82,6 +83,8 @@ def assemble(raw: Mapping[str, Any], question: str = "") -> tuple[Experiment | N
     findings += consistency.labels(labels, len(entries))
     findings += consistency.claims(claims, labels, reports, parts["source"])
     findings += consistency.traces(head, parts["monte_carlo"])
+    parts["plugins"], wrong = plugged.used(parts["system"], filters, raw.get("plugins"))
+    findings += wrong
     if findings or head is None or reports is None:
         return None, findings
     parts["claims"] = [each.model_copy(update={"at": each.at or reports}) for each in claims if each]
@@ -124,13 +127,17 @@ def _system(raw: Mapping[str, Any], findings: list[Finding]) -> tuple[str | None
         findings.append(_nameless(given, ("system",), "system"))
         return None, None
     name = given.pop("name")
-    if name not in systems.MODULES:
-        findings.append(
-            Finding(("system", "name"), f"unknown system '{name}'{suggestion(name, systems.available())}")
-        )
+    unknown = plugged.unknown(name, "system", systems.is_known, systems.available())
+    if unknown:
+        findings.append(Finding(("system", "name"), unknown))
         return None, None
     parameters = _kept(validated(systems.parameters(name), given, ("system",)), findings)
-    return name, SystemSpec(name=name, parameters=parameters.model_dump(mode="json")) if parameters else None
+    if parameters is None:
+        return name, None
+    stated = parameters.model_dump(mode="json")
+    broken = plugged.broken(name, stated)
+    findings += [Finding(("system", "name"), message) for message in broken]
+    return (None, None) if broken else (name, SystemSpec(name=name, parameters=stated))
 
 
 def _kind(name: str | None, system: SystemSpec | None, changed: dict[str, Any]) -> tuple[bool, bool]:
@@ -139,7 +146,10 @@ def _kind(name: str | None, system: SystemSpec | None, changed: dict[str, Any]) 
 
     if name is None:
         return next(iter(catalogue.KINDS))
-    return systems.kind(name, {**(system.parameters if system else {}), **changed})
+    try:
+        return systems.kind(name, {**(system.parameters if system else {}), **changed})
+    except ConfigError:  # of a plug-in's factory, which is asked again where this would be computed
+        return next(iter(catalogue.KINDS))
 
 
 def _entry(given: Any) -> Any:
@@ -207,8 +217,9 @@ def _filter(
     name, options, at = given["name"], None, (*path, "name")
     model = _believed(system_name, system, given.get("model") or {}, (*path, "model"), findings)
     kind = _kind(system_name, system, model)
-    if name not in catalogue.available():
-        findings.append(Finding(at, f"unknown filter '{name}'{suggestion(name, catalogue.available())}"))
+    known = catalogue.available()
+    if unknown := plugged.unknown(name, "filter", known.__contains__, known):
+        findings.append(Finding(at, unknown))
     elif refused := catalogue.refusal(name, *kind):
         findings.append(Finding(at, f"'{name}' {refused}"))
     else:

@@ -8,21 +8,28 @@ from typing import Any
 
 from nlbench.config import document as documents
 from nlbench.config import overrides as settings
+from nlbench.config import plugged
 from nlbench.config.assemble import assemble
 from nlbench.config.places import dotted
 from nlbench.config.schema import Experiment
 from nlbench.errors import ConfigError, Problem
 
 
-def load(path: str | os.PathLike[str], overrides: Sequence[str | settings.Override] = ()) -> Experiment:
+def load(
+    path: str | os.PathLike[str],
+    overrides: Sequence[str | settings.Override] = (),
+    recorded: bool = False,
+) -> Experiment:
     """The experiment in a YAML file, with overrides (`time.step=0.01`) applied in their order.
 
+    recorded: whether the file is what a run recorded, of which plug-ins are known by name and nothing is run.
     Raises `ConfigError`: alone, for what cannot be read (no file, bad syntax, duplicate keys); otherwise with
     every problem of keys, values, names and their consistency, each with its place in the file or option.
     """
     document = documents.read(path)
     settings.apply(document, [settings.parse(each) if isinstance(each, str) else each for each in overrides])
-    experiment, findings = assemble(document.data, document.question)
+    with plugged.standing_in(document.data if recorded else {}):
+        experiment, findings = assemble(document.data, document.question)
     if experiment is None:
         problems = [document.problem(each.path, each.message, each.at_key) for each in findings]
         raise ConfigError(sorted(problems, key=lambda each: (each.line or 0, each.column or 0)))

@@ -82,6 +82,31 @@ class FilterSpec(Section):
     initial: dict[str, Any] = Field(default_factory=dict)
 
 
+class PluginSystem(Section):
+    """The kind of a system that a plug-in brought."""
+
+    discrete: bool
+    continuous: bool
+
+
+class PluginSpec(Section):
+    """A plug-in that the experiment uses, filled in when its names are found; what the user allowed is carried along,
+    so that another process can have it, and is not written down."""
+
+    file: str
+    digest: str
+    systems: dict[str, PluginSystem] = Field(default_factory=dict)
+    filters: list[str] = Field(default_factory=list)
+    path: str = Field(default="", exclude=True)
+    source: str = Field(default="", exclude=True, repr=False)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, PluginSpec) and self.model_dump() == other.model_dump()
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+
 class Initial(Section):
     """Initial moments; a variance is short for a diagonal covariance."""
 
@@ -192,6 +217,7 @@ class Experiment(Section):
     traces: list[RunNumber] = Field(default_factory=list)
     bounds: list[Bound] = Field(default_factory=list)
     scores: bool = True
+    plugins: list[PluginSpec] = Field(default_factory=list)
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -218,6 +244,8 @@ class Experiment(Section):
             beliefs = {key: value for key in ("model", "initial") if (value := each.pop(key))}
             each.update(each.pop("options"), **beliefs)
         plain["claims"] = [claim.model_dump(mode="json", exclude_none=True) for claim in self.claims]
+        if not self.plugins:
+            del plain["plugins"]
         return plain
 
     def resolved_yaml(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["plan", "replay", "run", "verify"]
+__all__ = ["check", "plan", "replay", "run", "verify"]
 
 
 def run(
@@ -35,6 +35,13 @@ def plan(experiment: Any, out: Any = None, precision: str | None = None) -> dict
 
     asked = None if precision is None else parse(precision, "precision")
     return plan(*_stated(experiment), "results" if out is None else out, asked)
+
+
+def check(experiment: Any) -> None:
+    """Raises `ConfigError` with what only shows when systems and filters are made, such as shapes that do not fit."""
+    from nlbench.engine.problem import make
+
+    make(*_stated(experiment))
 
 
 def replay(experiment: Any, label: str, trajectory: int) -> Any:

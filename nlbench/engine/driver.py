@@ -18,7 +18,7 @@ from nlbench.engine.interruption import stop_requests
 from nlbench.engine.memory import Load, memory_faults
 from nlbench.engine.problem import make
 from nlbench.engine.remote import Task
-from nlbench.engine.resume import Saver, finished_runs, numerics, resumed, sound
+from nlbench.engine.resume import Saver, finished_runs, numerics, resumed, same_program, sound
 from nlbench.engine.workers import Threads, Workers, in_order
 from nlbench.errors import ConfigError, Interrupted
 from nlbench.results.folder import RunFolder
@@ -65,14 +65,18 @@ def _run(
 ) -> Results:
     problem = make(experiment, own)
     compiled = None
-    if own is not None:  # what tells its results from those of another system is the program itself
+    if own is not None or experiment.plugins:
         compiled = compile_chunks(problem, experiment.monte_carlo.seed)
+    if own is not None and compiled:
+        # What tells its results from those of another system is the program itself.
         experiment = _identified(experiment, compiled.program)
     folder = RunFolder(out / experiment.experiment / experiment.hash12())
     with folder.locked():
         done = finished_runs(folder)
         runs = max(experiment.monte_carlo.runs, done or 0)
         if done == runs and sound(folder) and complete(folder, experiment):
+            if experiment.plugins and compiled:
+                same_program(folder, compiled)
             read_anew(folder, experiment)
             return Results(folder.path)
         begun = time.perf_counter()
@@ -99,7 +103,8 @@ def _workers(
     """Threads of this process, or the workers of a cluster."""
     if dask is None:
         return Threads(compiled, runs, threads)
-    return dask_workers(dask, Task(experiment.resolved_yaml(), runs, tuple(numerics(compiled).items())))
+    decides, allowed = tuple(numerics(compiled).items()), tuple(experiment.plugins)
+    return dask_workers(dask, Task(experiment.resolved_yaml(), runs, decides, allowed))
 
 
 def _identified(experiment: Experiment, program: str) -> Experiment:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from nlbench import filters, schedule, systems
+from nlbench import filters, plugins, schedule, systems
 from nlbench.config.schema import PARTICLES
 from nlbench.engine.claims import check_claims
 from nlbench.errors import ConfigError
@@ -64,6 +64,7 @@ def make(experiment: Experiment, own: System | DiscreteSystem | None = None) -> 
 
     Raises `ConfigError`, with all that was found, where a filter does not apply and where model and data do not fit.
     """
+    plugins.restore(experiment.plugins)
     stated = own or systems.build(
         experiment.system.name, **{**experiment.system.parameters, **experiment.truth}
     )

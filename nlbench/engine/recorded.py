@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import numpy as np
 
-from nlbench import filters, systems
+from nlbench import filters, plugins, systems
 from nlbench.config.consistency import MOST_STEPS
 from nlbench.config.schema import PARTICLES, FilterSpec
 from nlbench.engine.problem import overridden
@@ -73,6 +73,7 @@ def bound(experiment: Experiment, labels: Sequence[str]) -> list[Filter]:
 
     Raises `ConfigError` with every problem there is.
     """
+    plugins.restore(experiment.plugins)
     made, problems = [], []
     for spec in _specs(experiment):
         if spec.label in labels:

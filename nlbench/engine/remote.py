@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from nlbench.errors import EnvironmentFault
 
 if TYPE_CHECKING:
+    from nlbench.config.schema import PluginSpec
     from nlbench.engine.compiled import Compiled
     from nlbench.engine.workers import Part
 
@@ -23,18 +24,19 @@ _one_builds = threading.Lock()
 
 
 class Task(NamedTuple):
-    """What all calls of a run share: the resolved experiment (YAML), its number of runs, and what decides digits
-    where the results are merged (`resume.numerics`)."""
+    """What all calls of a run share: the resolved experiment (YAML), its number of runs, what decides digits where the
+    results are merged (`resume.numerics`), and the plug-ins that the user has allowed there, with their source."""
 
     experiment: str
     runs: int
     numerics: tuple[tuple[str, str], ...]
+    plugins: tuple[PluginSpec, ...] = ()
 
 
 def compute(task: Task, first: int, count: int) -> Part:
     """Sums of blocks first ... first + count - 1. Raises `EnvironmentFault` where digits could differ."""
     with _one_builds:
-        compiled = _compiled(task.experiment)
+        compiled = _compiled(task.experiment, task.plugins)
     _refuse_differences(compiled, dict(task.numerics))
     from nlbench.engine.workers import Part
 
@@ -44,10 +46,11 @@ def compute(task: Task, first: int, count: int) -> Part:
 
 
 @lru_cache(PROGRAMS)
-def _compiled(text: str) -> Compiled:
-    from nlbench import config, runtime
+def _compiled(text: str, allowed: tuple[PluginSpec, ...]) -> Compiled:
+    from nlbench import config, plugins, runtime
     from nlbench.config.document import compose
 
+    plugins.restore(allowed)
     experiment = config.from_dict(compose(text, "the experiment").data)
     runtime.configure(precision=experiment.engine.precision)
     from nlbench.engine.compiled import compile_chunks

@@ -65,6 +65,20 @@ def resumed(folder: RunFolder, compiled: Compiled) -> Totals:
     return Totals.from_state(compiled.problem.layout, arrays)
 
 
+def same_program(folder: RunFolder, compiled: Compiled) -> None:
+    """Raises `EnvironmentFault` if a finished run was computed by another program.
+
+    The source of a plug-in, which is part of the run's name, does not hold what it imports or reads.
+    """
+    then, now = Results(folder.path).manifest["fingerprint"], numerics(compiled)
+    # Other software may make another program of the same plug-in, and the results are as good as ever.
+    if then != now and then == {**now, "program": then.get("program")}:
+        raise EnvironmentFault(
+            f"{folder.path} was computed by another program, though the plug-in is the same: something that it imports "
+            "or reads has changed; choose another folder with --out, or delete that one"
+        )
+
+
 class Saver:
     """Saves totals now and then, and knows which are saved."""
 

@@ -10,7 +10,7 @@ from nlbench.errors import ConfigError
 from nlbench.figures import style
 from nlbench.figures.consistency import nees
 from nlbench.figures.cost import cost
-from nlbench.figures.data import Data, read
+from nlbench.figures.data import Data, chosen, read
 from nlbench.figures.density import density
 from nlbench.figures.divergence import divergence
 from nlbench.figures.error_curves import mean_error, rms, rms_clipped
@@ -22,6 +22,8 @@ from nlbench.figures.traces import trace
 from nlbench.results.atomic import atomic_write, remove
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from nlbench.results.results import Results
 
 FIGURES: dict[str, Callable[[Data], Iterator[Picture]]] = {
@@ -40,6 +42,22 @@ FIGURES: dict[str, Callable[[Data], Iterator[Picture]]] = {
 }
 # Drawn only where an experiment file asks for them: there are many pictures of these, or they show what others do.
 ON_REQUEST = ("density", "response", "final")
+
+
+def one(
+    results: Results, name: str, coordinate: str | None = None, filters: Sequence[str] | None = None
+) -> Figure:
+    """The figure of a kind, a key of `FIGURES`, of one coordinate (default: the first) and some filters (all).
+
+    Raises `ConfigError` where there is none.
+    """
+    with style.context(salt=name):
+        pictures = {each.name: settle(each) for each in FIGURES[name](chosen(read(results), filters))}
+    wanted = next(iter(pictures), "") if coordinate is None else f"{name}-{coordinate}"
+    if wanted not in pictures:
+        there = ", ".join(each.removeprefix(f"{name}-") for each in pictures) or "nothing of that kind"
+        raise ConfigError(f"no figure '{name}' of {coordinate or 'this run'}; there is: {there}")
+    return pictures[wanted].figure
 
 
 def draw(results: Results, names: Sequence[str] | None = None) -> list[Path]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -96,6 +96,16 @@ def read(results: Results) -> Data:
         consistency=_saved(results, "consistency"),
         bounds=_saved(results, "bounds"),
     )
+
+
+def chosen(data: Data, filters: Sequence[str] | None) -> Data:
+    """With those filters only, in the order of the tables; the baseline is one of them."""
+    if filters is None:
+        return data
+    kept = tuple(label for label in data.filters if label in filters)
+    baseline = data.baseline if data.baseline in kept else _best(kept, data.curves)
+    reference = data.reference if data.reference in kept else None
+    return data._replace(filters=kept, baseline=baseline, reference=reference)
 
 
 def _saved(results: Results, name: str) -> pd.DataFrame | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from nlbench.filters.catalogue import FILTERS, available, options, refusal, row, summary
+from nlbench.filters.catalogue import available, options, refusal, row, summary
 
 if TYPE_CHECKING:
     from nlbench.filters.filter import Filter
@@ -28,7 +28,7 @@ def build(name: str, system: System | DiscreteSystem, **options: Any) -> Filter:
     from nlbench.systems.system import kind
 
     of = kind(system)
-    found = row(known(name, FILTERS, what="filter"), *of)
+    found = row(known(name, available(), what="filter"), *of)
     refused = refusal(name, *of)
     if refused:
         raise ConfigError(f"{name}: {refused}")
@@ -45,13 +45,14 @@ def build(name: str, system: System | DiscreteSystem, **options: Any) -> Filter:
 def check(system: System | DiscreteSystem) -> None:
     """Raises `ConfigError` with a line for each shape in a system that does not fit, got and expected."""
     from nlbench.discrete import shapes as in_steps
-    from nlbench.filters import shapes
+    from nlbench.filters import rules, shapes
     from nlbench.systems.discrete import DiscreteSystem
 
     if isinstance(system, DiscreteSystem):
         in_steps.check_shapes(system)
     else:
         shapes.check_shapes(system)
+    rules.check_rules(system)
 
 
 def _builder(family: str) -> Callable[..., Filter]:
@@ -60,6 +61,8 @@ def _builder(family: str) -> Callable[..., Filter]:
         from nlbench.continuous import build
     elif family == "discrete":
         from nlbench.discrete import build
+    elif family == "plugin":
+        from nlbench.filters.plugged import build
     elif family == "baseline":
         from nlbench.filters.unfiltered import build
     else:

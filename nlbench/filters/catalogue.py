@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import BaseModel, Field, PositiveFloat, PositiveInt
 
+from nlbench import plugins
 from nlbench.continuous.catalogue import ROWS as CONTINUOUS
 from nlbench.continuous.catalogue import SHARED as ALSO_CONTINUOUS
 from nlbench.discrete.catalogue import ROWS as DISCRETE
@@ -216,6 +217,7 @@ TAKEN = {
     "discrete": [(False, False), (True, False)],
     "baseline": list(KINDS),
     "reference": list(KINDS),
+    "plugin": [(False, False), (True, False)],  # or fewer: its factory may refuse a system
 }
 
 
@@ -226,7 +228,9 @@ def row(name: str, discrete: bool = False, continuous: bool = False) -> Row:
     """
     if continuous and name in ALSO_CONTINUOUS:
         return ALSO_CONTINUOUS[name]
-    return DISCRETE[name] if discrete and name in DISCRETE else FILTERS[name]
+    if discrete and name in DISCRETE:
+        return DISCRETE[name]
+    return FILTERS[name] if name in FILTERS else _plugged(name)
 
 
 def takes(name: str) -> tuple[tuple[bool, bool], ...]:
@@ -246,8 +250,8 @@ def refusal(name: str, discrete: bool = False, continuous: bool = False) -> str 
 
 
 def available() -> tuple[str, ...]:
-    """Names that `nlbench.filters.build` takes."""
-    return tuple(FILTERS)
+    """Names that `nlbench.filters.build` takes, those of plug-ins last."""
+    return (*FILTERS, *plugins.names("filters"))
 
 
 def options(name: str, discrete: bool = False, continuous: bool = False) -> type[BaseModel]:
@@ -257,5 +261,14 @@ def options(name: str, discrete: bool = False, continuous: bool = False) -> type
 
 def summary(name: str) -> str:
     """One line on what the filter is, with its source."""
-    row = FILTERS[name]
-    return f"{row.says} ({row.source})"
+    found = row(name)
+    return f"{found.says} ({found.source})"
+
+
+def _plugged(name: str) -> Row:
+    """The row of a filter of a plug-in. Raises `ConfigError` for an installed one that is broken."""
+    found = plugins.find("filters", name)
+    if found is None:
+        raise KeyError(name)
+    plugin, entry = found
+    return Row(entry.summary, plugin.file, 2, name, entry.parameters, "plugin")

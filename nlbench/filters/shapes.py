@@ -27,7 +27,10 @@ def check_shapes(system: System) -> None:
         *_returned("observe", system.observe, x, (m,)),
     ]
     if system.diffusion is not None:
-        s = None if system.diffusion_cov is None else np.shape(system.diffusion_cov)[0]
+        s = None
+        if system.diffusion_cov is not None:
+            s = len(np.atleast_1d(system.diffusion_cov))
+            found += _array("diffusion_cov", system.diffusion_cov, (s, s))
         found += _returned("diffusion", system.diffusion, x, (n, s))
     if found:
         raise ConfigError([Problem(each) for each in found])

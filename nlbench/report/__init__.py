@@ -9,6 +9,13 @@ if TYPE_CHECKING:
     from nlbench.results.results import Results
 
 
+def brief(results: Results) -> str:
+    """The essence of a run as a fragment of HTML, for a cell of a notebook."""
+    from nlbench.report import fragment
+
+    return fragment.brief(results)
+
+
 def write(results: Results) -> Path:
     """Draw the figures of a run and write its `report.html`. Returns the path of the page."""
     from nlbench import figures

@@ -40,7 +40,7 @@ class Results:
         from nlbench.config import load
 
         self._checked(EXPERIMENT)
-        return load(self.path / EXPERIMENT)
+        return load(self.path / EXPERIMENT, recorded=True)
 
     @property
     def tables(self) -> tuple[str, ...]:

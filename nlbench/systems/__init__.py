@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
+
+from nlbench import plugins
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -35,8 +38,13 @@ MODULES = {
 
 
 def available() -> tuple[str, ...]:
-    """Names that `build` takes."""
-    return tuple(name for name in MODULES if name != OWN)
+    """Names that `build` takes, those of plug-ins last."""
+    return (*(name for name in MODULES if name != OWN), *plugins.names("systems"))
+
+
+def is_known(name: str) -> bool:
+    """Whether there is a system of that name. Raises `ConfigError` for an installed plug-in that is broken."""
+    return name in MODULES or plugins.find("systems", name) is not None
 
 
 def parameters(name: str) -> type[BaseModel]:
@@ -53,11 +61,13 @@ def kind(name: str, parameters: Mapping[str, Any]) -> Kind:
     """The kind of the system of that name with these parameters, without building it.
 
     A module says `TIME = "discrete"` or `MEASUREMENT = "continuous"` for all parameters, or has a parameter, `time` or
-    `measurement`, that decides; else time is continuous and measurements are not.
+    `measurement`, that decides; else time is continuous and measurements are not. That of a plug-in is built to see.
     """
     from nlbench.systems.system import Kind
 
     module = _module(name)
+    if isinstance(module, SimpleNamespace):
+        return Kind(*module.kind_of(parameters))
     return Kind(
         discrete=getattr(module, "TIME", parameters.get("time")) == "discrete",
         continuous=getattr(module, "MEASUREMENT", parameters.get("measurement")) == "continuous",
@@ -78,4 +88,36 @@ def build(name: str, **parameters: Any) -> System | DiscreteSystem:
 def _module(name: str) -> Any:
     from nlbench.checks import known
 
-    return importlib.import_module(MODULES[known(name, MODULES, what="system")])
+    if name in MODULES:
+        return importlib.import_module(MODULES[name])
+    found = plugins.find("systems", name)
+    if found is None:
+        known(name, (*MODULES, *plugins.names("systems")), what="system")
+        raise AssertionError(name)
+    return _plugged(name, *found)
+
+
+def _plugged(name: str, plugin: plugins.Plugin, entry: plugins.Entry) -> Any:
+    """What a module has, of a system of a plug-in."""
+    what = f"system '{name}'"
+
+    def build(parameters: BaseModel) -> Any:
+        from nlbench.errors import ConfigError, Problem
+        from nlbench.systems.discrete import DiscreteSystem
+        from nlbench.systems.system import System
+
+        system = plugins.made(plugin, what, entry, parameters)
+        if not isinstance(system, (System, DiscreteSystem)):
+            message = (
+                f"{what}: made a {type(system).__name__}, expected a nlbench.System or nlbench.DiscreteSystem"
+            )
+            raise ConfigError([Problem(message, file=plugin.path)])
+        return system
+
+    def kind_of(parameters: Mapping[str, Any]) -> tuple[bool, bool]:
+        from nlbench.checks import checked
+        from nlbench.systems.system import kind
+
+        return entry.kind or kind(build(checked(entry.parameters, parameters, where=name)))
+
+    return SimpleNamespace(SUMMARY=entry.summary, Parameters=entry.parameters, build=build, kind_of=kind_of)

@@ -1,0 +1,137 @@
+"""Systems and filters of the user's own: code that runs only when the user names its file or has installed it.
+
+A plug-in is a Python file with `SYSTEMS = {"name": factory}`, `FILTERS = {"name": factory}` or both, or an installed
+package with entry points of the groups `nlbench.systems` and `nlbench.filters`. Its names then stand beside the
+built-in ones. An experiment file alone never makes code run. Importing this loads no numerical library.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from nlbench.errors import ConfigError
+from nlbench.plugins import installed, source
+from nlbench.plugins.plugin import Entry, Kind, Plugin, made, stand_in
+
+__all__ = [
+    "Entry",
+    "Kind",
+    "Plugin",
+    "allow",
+    "files",
+    "find",
+    "forget",
+    "hint",
+    "made",
+    "names",
+    "restore",
+    "standing_in",
+]
+
+_allowed: dict[str, Plugin] = {}  # by digest, in the order in which the user named them
+_standing_in: list[Plugin] = []
+
+
+def allow(*paths: str | Path, taken: Mapping[Kind, Collection[str]]) -> None:
+    """Run these files and make their systems and filters known; a file that was allowed before is read anew.
+
+    taken: names that are not free. Raises `ConfigError` with everything that is wrong with them.
+    """
+    problems, new = [], []
+    for path in paths:
+        try:
+            new.append(_free(source.of_file(path), taken))
+        except ConfigError as error:
+            problems += error.problems
+    if problems:
+        raise ConfigError(problems)
+    for plugin in new:
+        _register(plugin)
+
+
+def forget() -> None:
+    """Withdraw what was allowed; what is installed stays."""
+    _allowed.clear()
+
+
+def files() -> tuple[str, ...]:
+    """Paths of the files that were allowed, as the user gave them."""
+    return tuple(plugin.path for plugin in _allowed.values())
+
+
+def names(kind: Kind) -> tuple[str, ...]:
+    """Names of the systems or filters that plug-ins bring; what is only installed is not imported for it."""
+    own = [name for plugin in (*_standing_in, *_allowed.values()) for name in plugin.entries(kind)]
+    return tuple(dict.fromkeys([*own, *installed.names(kind)]))
+
+
+def find(kind: Kind, name: str) -> tuple[Plugin, Entry] | None:
+    """The plug-in that brings a name, and what it brings; None where none does.
+
+    Raises `ConfigError` for an installed one that is broken.
+    """
+    for plugin in (*_standing_in, *_allowed.values()):
+        if name in plugin.entries(kind):
+            return plugin, plugin.entries(kind)[name]
+    there = installed.find(kind, name)
+    return None if there is None else (there, there.entries(kind)[name])
+
+
+def hint(name: str) -> str:
+    """What may be meant by an unknown name: that of a plug-in, which only the user can allow."""
+    file, colon, _ = name.partition(":")
+    if colon or "." in name:
+        stem = file.removesuffix(".py").replace(".", "/")
+        return f"; an experiment file cannot make code run: allow it with --plugin {stem}.py"
+    return "; names of a plug-in are known with --plugin FILE.py"
+
+
+def restore(wanted: Sequence[Any]) -> None:
+    """Have the plug-ins of an experiment at hand, in this or another process, exactly as they were allowed.
+
+    wanted: `PluginSpec`s, with the source that the user allowed; one that was only read from a file of results has
+    none and runs nothing. Raises `ConfigError` for one that is neither at hand nor carried along.
+    """
+    for spec in wanted:
+        if spec.digest in _allowed or installed.has(spec.digest):
+            continue
+        if not spec.source:
+            raise ConfigError(
+                f"this experiment needs the plug-in {spec.file}: allow it with --plugin {spec.file}"
+            )
+        _register(source.executed(spec.source, spec.path))
+
+
+@contextlib.contextmanager
+def standing_in(recorded: Sequence[Any]) -> Iterator[None]:
+    """Within it, what the plug-ins of saved results brought is known by name and kind, and no code runs."""
+    before = len(_standing_in)
+    _standing_in.extend(stand_in(spec) for spec in recorded)
+    try:
+        yield
+    finally:
+        del _standing_in[before:]
+
+
+def _register(plugin: Plugin) -> None:
+    for digest, other in list(_allowed.items()):
+        if other.path == plugin.path:
+            del _allowed[digest]
+    _allowed[plugin.digest] = plugin
+
+
+def _free(plugin: Plugin, taken: Mapping[Kind, Collection[str]]) -> Plugin:
+    """The plug-in, if all its names are free. Raises `ConfigError` otherwise."""
+    for kind in taken:
+        for name in plugin.entries(kind):
+            if name in taken[kind]:
+                raise ConfigError(f"{plugin.path}: {kind}: '{name}' is a built-in name; choose another")
+            other = next(
+                (p for p in _allowed.values() if name in p.entries(kind) and p.path != plugin.path), None
+            )
+            if other is not None:
+                raise ConfigError(f"{plugin.path}: {kind}: '{name}' is already that of {other.path}")
+    return plugin
