@@ -20,6 +20,7 @@ TOP = (
     ("truth", "parameters of the system that makes the data, where it differs from what filters believe"),
     ("filters", "a list of [filters](filters/index.md): names, or mappings; required"),
     ("claims", "a list of [claims](#claims)"),
+    ("plugins", "the plug-ins that a run used: written by the run, and no permission"),
     *((name, f"a section: [{name}](#{name})") for name in SAID),
 )
 

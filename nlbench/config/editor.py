@@ -43,6 +43,11 @@ def json_schema() -> Schema:
             "items": _model(Claim),
             "description": "what is expected of the filters",
         },
+        "plugins": {
+            "type": "array",
+            "items": {"type": "object"},
+            "description": "the plug-ins that a run used: written by the run, and no permission",
+        },
     }
     schema = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property
 
 import numpy as np
 import pandas as pd
@@ -24,21 +23,21 @@ COLUMNS = ("id", "runs", "sets", "share", "low", "high")
 
 
 class KeptTable:
-    """The table of kept runs, by filter and time. `clip` and `norms` are those of `Layout`, by name."""
+    """The table of kept runs, by filter and time. `clip` and `norms` are those of `Layout`, by name.
+
+    coordinates: names of the errors, in the order of the table's columns.
+    """
 
     def __init__(self, runs: pd.DataFrame, clip: Mapping[str, float], norms: Mapping[str, Sequence[str]]):
         self.clip, self.norms = dict(clip), {name: list(members) for name, members in norms.items()}
+        # The order of `clip` means nothing: a manifest sorts its keys.
+        self.coordinates = [name for name in runs.columns if name in self.clip and name not in self.norms]
         self._rows = {
             (str(label), round(float(time), 9)): rows
             for (label, time), rows in runs.groupby(["filter", "time"], sort=False)
         }
         self.count = min((len(rows) for rows in self._rows.values()), default=0)
         self._columns: dict[tuple[str, float, str], np.ndarray] = {}
-
-    @cached_property
-    def coordinates(self) -> list[str]:
-        """Names of the errors, in the order of the table."""
-        return [name for name in self.clip if name not in self.norms]
 
     def column(self, label: str, time: float, name: str) -> np.ndarray | None:
         """A column of one filter at one time; None where the table does not have it."""

@@ -147,7 +147,7 @@ def test_a_billion_runs_are_refused_without_a_question(tmp_path, monkeypatch):
 def test_yes_lets_any_run_begin(tmp_path, monkeypatch):
     seen = {}
 
-    def run(experiment, out, progress, check):
+    def run(experiment, out, progress, check, dask):
         seen.update(progress=progress, check=check)
         raise KeyboardInterrupt
 

@@ -108,3 +108,10 @@ def test_the_draw_depends_on_nothing_but_the_size():
     np.testing.assert_array_equal(kept.drawn(10), kept.drawn(10))
     table = sets_table([claim(less=["a", "b"])], kept, None)
     pd.testing.assert_frame_equal(table, sets_table([claim(less=["a", "b"])], kept, None))
+
+
+def test_coordinates_stand_in_the_order_of_the_table_however_a_manifest_sorts_them():
+    columns = ["filter", "time", "run", "y", "x", "y_variance", "x_variance", "diverged"]
+    runs = pd.DataFrame([["a", 1.0, 0, 1.0, 2.0, 1.0, 1.0, False]], columns=columns)
+    kept = KeptTable(runs, {"both": 1.0, "x": 1.0, "y": 1.0}, {"both": ["y", "x"]})
+    assert kept.coordinates == ["y", "x"]
