@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 WIDTH = 76
+LONGEST = 900  # characters of a message; lists of all names are shorter
 
 
 class Problem(NamedTuple):
@@ -25,10 +26,23 @@ class Problem(NamedTuple):
     def __str__(self) -> str:
         place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
         path = "" if self.line is None and self.file.endswith(f" {self.path}") else self.path
-        head = ": ".join(part for part in (place, path, self.message) if part)
+        head = printable(": ".join(part for part in (place, path, _shortened(self.message)) if part))
         if not self.source_line or self.column is None:
             return head
         return f"{head}\n{_pointed(self.source_line, self.column)}"
+
+
+def _shortened(message: str) -> str:
+    """A message without its middle, where it repeats a value of thousands of characters."""
+    return message if len(message) <= LONGEST else f"{message[: LONGEST // 2]} ... {message[-LONGEST // 2 :]}"
+
+
+def printable(text: str) -> str:
+    """The text with characters that do not print, or that command a terminal, as their codes; line ends stay."""
+    return "".join(
+        letter if letter.isprintable() or letter == "\n" else letter.encode("unicode_escape").decode()
+        for letter in text
+    )
 
 
 def _pointed(line: str, column: int) -> str:

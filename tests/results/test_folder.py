@@ -244,6 +244,15 @@ def test_the_fingerprint_depends_on_features_and_flags_but_not_on_how_work_is_sh
     assert [line.partition(":")[0] for line in changed] == ["cpu_features", "device", "xla_flags"]
 
 
+def test_the_fingerprint_tells_kernels_that_the_environment_chooses(monkeypatch):
+    monkeypatch.delenv("OPENBLAS_CORETYPE", raising=False)
+    usual = fingerprint.fingerprint()
+    assert "blas" not in usual
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Haswell")
+    changed = fingerprint.differences(fingerprint.fingerprint(), usual)
+    assert changed == ["blas: None then, OPENBLAS_CORETYPE=Haswell now"]
+
+
 def test_the_fingerprint_needs_no_cpuinfo(tmp_path):
     assert fingerprint.fingerprint(cpuinfo=tmp_path / "none")["cpu_features"]
 
