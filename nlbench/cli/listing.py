@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nlbench.cli import options, output
-from nlbench.errors import ConfigError
+from nlbench.errors import ConfigError, printable
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -153,5 +153,5 @@ def _experiments(folder: Path, json: bool) -> None:
         raise ConfigError(f"no experiment (*.yaml) in '{folder}'")
     for each in entries:
         print(each["file"])
-        output.definitions([("", str(each["question"]))], indent=0)
+        output.definitions([("", printable(str(each["question"])))], indent=0)
     output.next_step(f"nlbench run {entries[0]['file']}", "runs the first")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from nlbench.cli import options, output, planned
-from nlbench.errors import ConfigError, EnvironmentFault
+from nlbench.errors import ConfigError, EnvironmentFault, printable
 
 
 def validate(
@@ -30,7 +30,7 @@ def validate(
     times = ", ".join(f"{time:g}" for time in experiment.report_times)
     output.definitions(
         [
-            ("question", experiment.question or "none; make it the first line: # ..."),
+            ("question", printable(experiment.question) or "none; make it the first line: # ..."),
             ("system", experiment.system.name),
             ("filters", ", ".join(experiment.labels)),
             ("time", f"to {experiment.time.end:g} in steps of {experiment.time.step:g}; reports at {times}"),

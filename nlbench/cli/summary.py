@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nlbench.cli import output
-from nlbench.errors import GateError, LimitError, NlbenchError
+from nlbench.errors import GateError, LimitError, NlbenchError, printable
 
 if TYPE_CHECKING:
     from nlbench.config import Experiment
@@ -74,7 +74,11 @@ def faults(experiment: Experiment, facts: dict[str, Any], gate: bool) -> list[Nl
 
 def show(experiment: Experiment, facts: dict[str, Any]) -> None:
     """Print the facts within 80 columns."""
-    print(output.styled(experiment.question, "bold") if experiment.question else experiment.experiment)
+    print(
+        output.styled(printable(experiment.question), "bold")
+        if experiment.question
+        else experiment.experiment
+    )
     print(f"{experiment.experiment}, {facts['runs']:,} runs, seed {facts['seed']}, results {facts['hash']}\n")
     lost = failed(facts)
     for coordinate in dict.fromkeys(row["coordinate"] for row in facts["rms"]):
