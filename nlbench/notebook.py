@@ -65,15 +65,19 @@ class Results(results.Results):
         return figures.one(self, kind, coordinate, filters)
 
 
-def run(experiment: Any, out: Any = None, progress: Any = None) -> Results:
+def run(
+    experiment: Any, out: Any = None, progress: Any = None, check: Any = None, dask: str | None = None
+) -> Results:
     """Run an experiment, or go on with one that was stopped, and return its `Results`.
 
     experiment: an `Experiment`, a path of an experiment file, or a dict with the keys of one, whose `system` may be a
         `System` or `DiscreteSystem` of your own.
-    out: folder of results (default "results"). progress: called with (runs done, runs in all).
+    out: folder of results (default "results"). progress: called with (runs done, runs in all). check: called before
+        anything is computed, and may raise (`nlbench.engine.planning.space.require` where room is short).
+    dask: compute with the workers of a dask scheduler, "tcp://HOST:PORT", or with "local:N" processes.
     Raises `ConfigError` before anything is computed, `LockedError` where another process runs the same experiment,
     `EnvironmentFault` for disk and memory, `Interrupted` after Ctrl-C with everything so far saved.
     """
     from nlbench import engine
 
-    return Results(Path(engine.run(experiment, out, progress).path))
+    return Results(Path(engine.run(experiment, out, progress, check, dask).path))
