@@ -73,7 +73,7 @@ def test_among_the_tables_it_is_named_and_the_same_command_starts_again(undistur
     with monkeypatch.context() as patch:
         patch.setattr(finish, "cost_table", removed)
         with pytest.raises(EnvironmentFault, match=f"{undisturbed.name} was removed or replaced") as caught:
-            nb.run(small(), tmp_path)
+            nb.run(small(engine={"chunk": 1, "threads": 2, "cost": True}), tmp_path)
     assert caught.value.exit_code == 5
     assert table_bytes(nb.run(small(), tmp_path).path) == table_bytes(undisturbed)
 
