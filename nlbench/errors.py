@@ -26,14 +26,15 @@ class Problem(NamedTuple):
     def __str__(self) -> str:
         place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
         path = "" if self.line is None and self.file.endswith(f" {self.path}") else self.path
-        head = printable(": ".join(part for part in (place, path, _shortened(self.message)) if part))
+        said = _shortened(": ".join(part for part in (path, self.message) if part))
+        head = printable(": ".join(part for part in (place, said) if part))
         if not self.source_line or self.column is None:
             return head
         return f"{head}\n{_pointed(self.source_line, self.column)}"
 
 
 def _shortened(message: str) -> str:
-    """A message without its middle, where it repeats a value of thousands of characters."""
+    """A message without its middle, where it repeats a name or a value of thousands of characters."""
     return message if len(message) <= LONGEST else f"{message[: LONGEST // 2]} ... {message[-LONGEST // 2 :]}"
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import os
 import sys
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 # Wide vectors, and loops over blocks run as one kernel. The second is undocumented, so jaxlib is pinned to a tested
@@ -15,6 +17,10 @@ XLA_OPTIONS = (
     "--xla_cpu_prefer_vector_width=512",
     "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1000000000",
 )
+# Trajectories of a block unless an experiment says so: as many as vectors want, or as fill a GPU.
+BLOCK, BLOCK_OF_A_GPU = 64, 8192
+DEVICES = Path("/dev")
+GPU_NODES = ("nvidia0", "kfd")  # NVIDIA's, AMD's
 _chosen: dict[str, Any] = {}
 log = logging.getLogger("nlbench")
 
@@ -67,6 +73,25 @@ def ensure_precision() -> None:
 def threads() -> int:
     """Threads of the engine: as configured, otherwise one for each core available to this process."""
     return _chosen.get("threads") or len(os.sched_getaffinity(0))
+
+
+def block() -> int:
+    """Trajectories of a block, unless an experiment says how many, on what this process will compute with."""
+    return BLOCK_OF_A_GPU if computes_on_a_gpu() else BLOCK
+
+
+def computes_on_a_gpu() -> bool:
+    """Whether jax computes on a GPU here, or will: it is not loaded for this, so that files are checked quickly.
+
+    It will where a plug-in of jax's is installed, a device is there, and JAX_PLATFORMS does not ask for cores.
+    """
+    if backend_started():
+        import jax
+
+        return jax.default_backend() == "gpu"
+    if os.environ.get("JAX_PLATFORMS", "").startswith("cpu") or find_spec("jax_plugins") is None:
+        return False
+    return any((DEVICES / each).exists() for each in GPU_NODES)
 
 
 def backend_started() -> bool:

@@ -55,7 +55,7 @@ ALLOWED: dict[str, set[str]] = {
     "references": {"errors", "discrete", "discrete.catalogue", "systems.exact", *CORE},
     "continuous": {"row", "continuous.catalogue", "errors", *CORE},
     "filters": {"plugins", "row", "filters.catalogue", "continuous", "discrete", "references", *BASE, *CORE},
-    "config": {"plugins", "systems", "filters.catalogue", "errors", "suggestions"},
+    "config": {"plugins", "systems", "filters.catalogue", "errors", "suggestions", "runtime"},
     "statistics": set(),
     "results": {"config", "errors"},
     "engine": {

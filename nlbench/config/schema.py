@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from nlbench import runtime
 from nlbench.config.claim import Claim
 from nlbench.config.fields import Bound, Finite, Fraction, Label, Name, Positive, RunNumber, Section
 from nlbench.config.identity import canonical_hash, to_yaml
@@ -185,7 +186,12 @@ class EngineSpec(Section):
         default=None, ge=1, le=1_000_000, description="blocks in each call; 64 at most are"
     )
     threads: int | None = Field(default=None, ge=1, le=4096, description="default: one for each core")
-    block: int = Field(default=64, ge=1, le=65536, description="trajectories in a block")
+    block: int = Field(
+        default_factory=runtime.block,
+        ge=1,
+        le=65536,
+        description=f"trajectories in a block; default: {runtime.BLOCK}, on a GPU {runtime.BLOCK_OF_A_GPU}",
+    )
     precision: Literal["float64", "float32"] = Field(default="float64", description="of all that is computed")
     cost: bool = Field(default=True, description="measure what each filter costs, compiled by itself")
 
@@ -211,7 +217,7 @@ class Experiment(Section):
     initial: dict[str, Any] = Field(default_factory=dict)
     source: Source = Source()
     claims: list[Claim] = Field(default_factory=list)
-    engine: EngineSpec = EngineSpec()
+    engine: EngineSpec = Field(default_factory=EngineSpec)
     limits: Limits = Limits()
     figures: list[Figure] | None = None
     traces: list[RunNumber] = Field(default_factory=list)

@@ -23,19 +23,20 @@ CAPACITY = (
 
 
 class Compiled(NamedTuple):
-    """A compiled `chunk_sums` of at most `CAPACITY` blocks a call; `program` identifies what was compiled."""
+    """A compiled `chunk_sums` of at most `CAPACITY` blocks a call, once for each device of the process; `program`
+    identifies what was compiled."""
 
-    executable: Any
+    executables: tuple[Any, ...]
     problem: Problem
     seed: tuple[Any, Any]
     seconds: float
     program: str
     share: Share = ALL
 
-    def sums(self, first_block: int, count: int, runs: int) -> dict[str, np.ndarray]:
-        """Sums of blocks first_block ... first_block + count - 1 of the share, on the host."""
+    def sums(self, first_block: int, count: int, runs: int, device: int = 0) -> dict[str, np.ndarray]:
+        """Sums of blocks first_block ... first_block + count - 1 of the share, computed on a device, on the host."""
         chunk = make_chunk(self.problem, first_block, count, CAPACITY, runs, share=self.share)
-        sums, _ = self.executable(self.seed, chunk)
+        sums, _ = self.executables[device](self.seed, chunk)
         # Copied, so that sums that wait to be added do not keep arrays of the full capacity.
         return {name: np.asarray(value)[:count].copy() for name, value in sums.items()}
 
@@ -43,16 +44,20 @@ class Compiled(NamedTuple):
         """One trajectory in full, computed with its block by the same executable."""
         block, lane = divmod(trajectory, self.problem.block)
         chunk = make_chunk(self.problem, block, 1, CAPACITY, trajectory + 1, (0, lane))
-        return jax.tree.map(np.asarray, self.executable(self.seed, chunk)[1])
+        return jax.tree.map(np.asarray, self.executables[0](self.seed, chunk)[1])
 
 
 def compile_chunks(problem: Problem, seed: int) -> Compiled:
-    """Compile the block computation; the persistent cache keeps the result for the next process."""
+    """Compile the block computation for every device; the persistent cache keeps the result for the next process."""
     use_cache()
     seed_words = words(seed)
     example = make_chunk(problem, 0, CAPACITY, CAPACITY, CAPACITY * problem.block)
     begun = time.perf_counter()
-    lowered = jax.jit(partial(chunk_sums, problem)).lower(seed_words, example)
-    program = hashlib.sha256(lowered.as_text().encode()).hexdigest()[:12]
-    executable = lowered.compile()
-    return Compiled(executable, problem, seed_words, time.perf_counter() - begun, program)
+    computation = jax.jit(partial(chunk_sums, problem))
+    lowered = []
+    for device in jax.local_devices():
+        with jax.default_device(device):
+            lowered.append(computation.lower(seed_words, example))
+    program = hashlib.sha256(lowered[0].as_text().encode()).hexdigest()[:12]
+    executables = tuple(each.compile() for each in lowered)
+    return Compiled(executables, problem, seed_words, time.perf_counter() - begun, program)

@@ -6,8 +6,11 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from queue import SimpleQueue
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
+
+import jax
 
 from nlbench.engine.compiled import CAPACITY
 
@@ -15,6 +18,7 @@ if TYPE_CHECKING:
     from nlbench.engine.compiled import Compiled
 
 SECONDS_OF_A_CALL = 1.0
+CALLS_OF_A_DEVICE = 2
 
 
 class Part(NamedTuple):
@@ -35,20 +39,34 @@ class Workers(Protocol):
 
 
 class Threads:
-    """Threads of this process, which call the same compiled program on different blocks."""
+    """Threads of this process, which call the same compiled program on different blocks, on all devices in turn.
+
+    The cores are one device, called by as many threads as asked for; an accelerator is one each, and is called by two:
+    while it computes for one, the other fetches.
+    """
 
     def __init__(self, compiled: Compiled, runs: int, threads: int):
-        self.at_once = threads
+        devices = len(compiled.executables)
+        self.at_once = (
+            max(threads, devices) if jax.default_backend() == "cpu" else CALLS_OF_A_DEVICE * devices
+        )
         self._compiled, self._runs = compiled, runs
-        self._pool = ThreadPoolExecutor(threads)
+        self._free: SimpleQueue[int] = SimpleQueue()
+        for call in range(self.at_once):
+            self._free.put(call % devices)
+        self._pool = ThreadPoolExecutor(self.at_once)
 
     def submit(self, first: int, count: int) -> Future[Part]:
         return self._pool.submit(self._timed, first, count)
 
     def _timed(self, first: int, count: int) -> Part:
-        begun = time.perf_counter()
-        sums = self._compiled.sums(first, count, self._runs)
-        return Part(sums, time.perf_counter() - begun)
+        device = self._free.get()
+        try:
+            begun = time.perf_counter()
+            sums = self._compiled.sums(first, count, self._runs, device)
+            return Part(sums, time.perf_counter() - begun)
+        finally:
+            self._free.put(device)
 
     def __enter__(self) -> Threads:
         return self

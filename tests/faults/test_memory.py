@@ -48,8 +48,8 @@ class Scarce:
 @pytest.fixture
 def scarce(program, monkeypatch):
     def made(*arguments):
-        executable = Scarce(program.executable, *arguments)
-        found = program._replace(executable=executable)
+        executable = Scarce(program.executables[0], *arguments)
+        found = program._replace(executables=(executable,))
         monkeypatch.setattr(driver, "compile_chunks", lambda problem, seed: found)
         return executable
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from nlbench.errors import Problem
-from tests.input.mutants import answer, faults, main, mutant
+from tests.input.answers import answer
+from tests.input.mutants import main, mutant, wrong
 
 SECONDS = 10.0  # for one file, on a busy machine; the largest of configs/ takes a tenth
 
@@ -14,8 +15,8 @@ SECONDS = 10.0  # for one file, on a busy machine; the largest of configs/ takes
 def test_a_spoiled_file_is_answered_in_plain_words(tmp_path, number):
     path = tmp_path / "mutant.yaml"
     path.write_bytes(mutant(number))
-    given = answer(path)
-    assert faults(path, given, [path.name]) == [], given.said[-2000:]
+    given = answer("validate", path)
+    assert wrong(path, given, [path.name]) == [], given.said[-2000:]
     assert given.seconds < SECONDS
 
 

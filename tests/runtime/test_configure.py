@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import jax
 import numpy as np
 import pytest
 
 import nlbench as nb
+from nlbench import runtime
 from nlbench.errors import ConfigError
 from tests.small_runs import python
 
@@ -102,3 +104,30 @@ def test_every_wrong_shape_is_named_with_what_was_expected():
         "observe(t, x): got shape (2,), expected (1,)",
         "diffusion(t, x): got shape (2,), expected (2, any)",
     ]
+
+
+@pytest.mark.parametrize(
+    ("plug_in", "node", "platforms", "block"),
+    [
+        (True, True, "", 8192),
+        (True, True, "cuda,cpu", 8192),
+        (True, True, "cpu", 64),
+        (True, False, "", 64),
+        (False, True, "", 64),
+    ],
+)
+def test_blocks_are_larger_where_jax_will_compute_on_a_gpu(
+    monkeypatch, tmp_path, plug_in, node, platforms, block
+):
+    monkeypatch.setattr(runtime, "backend_started", lambda: False)
+    monkeypatch.setattr(runtime, "find_spec", lambda name: object() if plug_in else None)
+    monkeypatch.setattr(runtime, "DEVICES", tmp_path)
+    monkeypatch.setenv("JAX_PLATFORMS", platforms)
+    if node:
+        (tmp_path / "nvidia0").touch()
+    assert runtime.block() == block
+
+
+def test_blocks_are_of_64_where_cores_compute():
+    jax.devices()
+    assert runtime.block() == 64

@@ -23,7 +23,7 @@ PICTURE_BYTES, POINT_BYTES = 230_000, 470
 
 def program(compiled: Compiled) -> dict[str, int]:
     """Bytes that XLA gives: of the code, and of one call's arguments, results and working memory."""
-    analysis = compiled.executable.memory_analysis()
+    analysis = compiled.executables[0].memory_analysis()
     return {
         "code": analysis.generated_code_size_in_bytes,
         "argument": analysis.argument_size_in_bytes,
