@@ -54,10 +54,10 @@ class Workload(NamedTuple):
         return self.trajectories * self.times * self.steps
 
 
-def _attraction(xp: Any, x: Any) -> Any:
+def attraction(xp: Any, x: Any, mu: float = MU) -> Any:
     """Planar two-body motion, (x, y, their rates)."""
     square = x[0] * x[0] + x[1] * x[1]
-    pull = -MU / (square * xp.sqrt(square))
+    pull = -mu / (square * xp.sqrt(square))
     return xp.stack([x[2], x[3], pull * x[0], pull * x[1]])
 
 
@@ -102,7 +102,7 @@ ORBIT = Workload(
     name="orbit third order",
     system="orbit",
     says="planar two-body motion, a landmark's direction measured every 20 RK4 steps; third-order filter",
-    drift=_attraction,
+    drift=attraction,
     observe=lambda xp, x: xp.stack([xp.arctan2(LANDMARK[1] - x[1], LANDMARK[0] - x[0])]),
     noise_cov=np.array([[2.5e-5]]),
     mean=np.array([8.34e6, 0.0, 0.0, 4470.0]),

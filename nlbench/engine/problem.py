@@ -12,6 +12,7 @@ import numpy as np
 
 from nlbench import filters, plugins, schedule, systems
 from nlbench.config.schema import PARTICLES
+from nlbench.engine import single_precision
 from nlbench.engine.claims import check_claims
 from nlbench.errors import ConfigError
 from nlbench.moments.moments import Moments
@@ -62,7 +63,8 @@ class Problem(NamedTuple):
 def make(experiment: Experiment, own: System | DiscreteSystem | None = None) -> Problem:
     """The problem that an experiment states, about the user's own system if one is given.
 
-    Raises `ConfigError`, with all that was found, where a filter does not apply and where model and data do not fit.
+    Raises `ConfigError`, with all that was found, where a filter does not apply, where model and data do not fit, and
+    where derivatives do not survive float32.
     """
     plugins.restore(experiment.plugins)
     stated = own or systems.build(
@@ -77,6 +79,8 @@ def make(experiment: Experiment, own: System | DiscreteSystem | None = None) -> 
     if experiment.reference is not None:
         makers.append(partial(_reference, experiment.reference, experiment.labels[-1], truth, times))
     runners = _all(makers)
+    if experiment.engine.precision == "float32":
+        single_precision.check(runners)
     layout, block = _layout(experiment, stated), experiment.engine.block
     check_claims(experiment.claims, layout)
     return Problem(truth, runners, times, layout, block, stated, _nominal_steps(truth, times))

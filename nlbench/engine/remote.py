@@ -6,6 +6,9 @@ anything differs refuses, so that nothing is ever mixed.
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
+import os
 import signal
 import threading
 import time
@@ -19,6 +22,8 @@ if TYPE_CHECKING:
     from nlbench.engine.compiled import Compiled
     from nlbench.engine.workers import Part
 
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of mallopt(3)
+LARGEST_KEPT = 32 << 20  # bytes, the largest value that glibc takes
 PROGRAMS = 4  # kept in a worker process, for a cluster that is used again
 _one_builds = threading.Lock()
 
@@ -45,11 +50,29 @@ def compute(task: Task, first: int, count: int) -> Part:
     return Part(sums, time.perf_counter() - begun)
 
 
+def settle() -> None:
+    """Fit memory and threads of the process to what a worker does, before jax starts in it.
+
+    dask's workers start with MALLOC_TRIM_THRESHOLD_ at 64 KiB, which also keeps the C library from learning what to
+    keep: the arrays of every call were fetched anew from the kernel. And XLA starts as many threads as there are cores
+    in every process; those of several workers wait for each other. Two workers on two cores were no faster than one.
+    """
+    with contextlib.suppress(OSError, AttributeError):  # another C library
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(M_MMAP_THRESHOLD, LARGEST_KEPT)
+        mallopt(M_TRIM_THRESHOLD, 2 * LARGEST_KEPT)
+    with contextlib.suppress(ImportError, ValueError):  # not in a worker
+        from distributed import get_worker
+
+        os.environ.setdefault("PJRT_NPROC", str(get_worker().state.nthreads))
+
+
 @lru_cache(PROGRAMS)
 def _compiled(text: str, allowed: tuple[PluginSpec, ...]) -> Compiled:
     from nlbench import config, plugins, runtime
     from nlbench.config.document import compose
 
+    settle()
     plugins.restore(allowed)
     experiment = config.from_dict(compose(text, "the experiment").data)
     runtime.configure(precision=experiment.engine.precision)

@@ -94,6 +94,15 @@ def test_a_worker_with_other_software_refuses():
         remote.compute(task, 0, 1)
 
 
+def test_xla_gets_as_many_threads_as_the_worker_has(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(distributed, "get_worker", lambda: SimpleNamespace(state=SimpleNamespace(nthreads=3)))
+    monkeypatch.setenv("PJRT_NPROC", "0")  # put back afterwards
+    monkeypatch.delenv("PJRT_NPROC")
+    remote.settle()
+    assert os.environ["PJRT_NPROC"] == "3"
+
+
 @pytest.mark.parametrize("address", ["local", "local:0", "local:x", "somewhere", "tcp://host"])
 def test_an_address_that_is_none_is_a_mistake_of_usage(address):
     done = CliRunner().invoke(app, ["run", "configs/quickstart.yaml", "--dask", address])

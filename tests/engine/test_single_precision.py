@@ -1,0 +1,92 @@
+"""Claim: where derivatives do not survive float32, that is said before anything is computed."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import nlbench as nb
+from nlbench.engine import single_precision
+from nlbench.engine.problem import Runner
+from nlbench.errors import ConfigError
+from tests.small_runs import python
+
+MU, RADIUS, SPEED = 1.66935e14, 6.228e6, 5175.0  # the moon's attraction and an orbit, in feet and seconds
+
+
+def orbit(length, time):
+    """Planar two-body motion in such units."""
+    mu = MU * time**2 / length**3
+
+    def drift(t, x):
+        square = x[0] ** 2 + x[1] ** 2
+        return jnp.stack([x[2], x[3], *(-mu * x[:2] / (square * jnp.sqrt(square)))])
+
+    speed = length / time
+    return nb.System(
+        drift=drift,
+        observe=lambda t, x: x[:1] * length / RADIUS,
+        measurement_cov=np.eye(1),
+        initial=nb.Moments(
+            np.array([RADIUS / length, 0.0, 0.0, SPEED / speed]),
+            np.diag([1e6 / length**2] * 2 + [1.0 / speed**2] * 2),
+        ),
+        interval=50.0 / time,
+    )
+
+
+def checked(system, *names):
+    """What is said of the filters of a system; its steps do not matter."""
+    filters = [nb.filters.build(name, system) for name in names or ("ekf",)]
+    single_precision.check(tuple(Runner(f.name, f, system.initial, 1.0, 1) for f in filters))
+
+
+def test_derivatives_that_leave_the_range_are_named_once():
+    with pytest.raises(ConfigError) as caught:
+        checked(orbit(1.0, 1.0), "ekf", "second-order")
+    said, advice = str(caught.value).split("\n")
+    assert said.startswith(
+        "engine.precision: drift: first derivatives in float32 are off by 1"
+    )  # not the second
+    assert "float64" in advice
+
+
+def test_in_units_in_which_numbers_are_near_one_they_survive():
+    checked(orbit(RADIUS, RADIUS / SPEED), "ekf", "second-order")
+
+
+def test_a_derivative_that_vanishes_at_the_mean_is_none_that_was_lost():
+    swing = nb.System(
+        drift=lambda t, x: jnp.sin(x),
+        observe=lambda t, x: jnp.cos(x),
+        measurement_cov=np.eye(1),
+        initial=nb.Moments(np.array([np.pi / 2]), np.array([[0.01]])),
+        interval=50.0,
+    )
+    checked(swing)
+
+
+def test_in_discrete_time_too():
+    far = nb.DiscreteSystem(
+        transition=lambda k, x, w: 1e-30 * x**5 + w,
+        observe=lambda k, x, v: x + v,
+        process_cov=np.eye(1),
+        measurement_cov=np.eye(1),
+        initial=nb.Moments(np.array([1e10]), np.array([[1e6]])),
+        interval=1,
+    )
+    with pytest.raises(ConfigError, match="transition: values in float32"):
+        checked(far)
+
+
+def test_a_run_in_float32_is_refused_and_writes_nothing(tmp_path):
+    program = (
+        "import sys; from nlbench.cli import main\n"
+        "sys.argv = ['nlbench', 'run', 'configs/culver/orbit.yaml', '--set', 'engine.precision=float32', "
+        "'--set', 'reference=null', '--out', sys.argv[1]]; main()"
+    )
+    done = python(program, str(tmp_path / "out"))
+    assert done.returncode == 2, done.stderr
+    assert "drift: first derivatives in float32" in done.stderr
+    assert not (tmp_path / "out").exists()
