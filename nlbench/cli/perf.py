@@ -49,9 +49,11 @@ def perf(
     path = baseline or DEFAULT
     before = None if record or (baseline is None and not path.exists()) else read(path, identity())
     from nlbench import runtime
+    from nlbench.perf import timing
 
+    timing.on_one_thread()
     runtime.configure()
-    from nlbench.perf import gate, kernel, timing, workloads
+    from nlbench.perf import gate, kernel, workloads
     from nlbench.results.fingerprint import differences, fingerprint
 
     chosen = workloads.of_experiments(experiments) if experiments else workloads.standard()

@@ -7,6 +7,7 @@ import pytest
 
 from nlbench.perf import baseline, gate, verdict
 from nlbench.perf.counts import risen
+from tests.small_runs import python
 
 MACHINE = {"jaxlib": "1"}
 
@@ -96,3 +97,16 @@ def test_a_drift_of_the_whole_machine_cancels():
     found = verdict.estimate(seconds)
     assert found.ratio == pytest.approx(2.0, rel=1e-12)
     assert found.band == pytest.approx(0, abs=1e-12)
+
+
+def test_xla_gets_one_thread_whose_time_alone_is_counted():
+    program = (
+        "import os, time; from nlbench.perf import timing; timing.on_one_thread()\n"
+        "import jax, jax.numpy as jnp; x = jnp.ones((700, 700)); f = jax.jit(lambda x: jnp.sin(x @ x))\n"
+        "f(x).block_until_ready(); cpu, wall = time.process_time(), time.perf_counter()\n"
+        "for _ in range(40): f(x).block_until_ready()\n"
+        "print((time.process_time() - cpu) / (time.perf_counter() - wall))"
+    )
+    done = python(program)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 1.2
