@@ -7,6 +7,10 @@ import tempfile
 
 from jaxtyping import install_import_hook
 
+# Two workers compute beside each other, and XLA's threads of one would spin while those of the other work.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("PJRT_NPROC", "1")
+
 # Before anything of nlbench is imported: the hook decorates every function of these packages.
 NUMERICAL = (
     "algebra continuous discrete engine filters moments references simulate statistics systems updates"

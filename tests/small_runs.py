@@ -36,9 +36,10 @@ def table_bytes(folder: Path) -> dict[str, bytes]:
 
 
 def python(program: str, *arguments: str, xla_flags: str = "", **options: Any) -> subprocess.CompletedProcess:
-    """Run a program in a process of its own."""
+    """Run a program in a process of its own, with all of XLA's threads."""
+    plain = {name: value for name, value in os.environ.items() if name != "PJRT_NPROC"}
     environment = {
-        **os.environ,
+        **plain,
         "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
         "XLA_FLAGS": xla_flags,
     }

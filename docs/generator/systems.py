@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+
 from docs.generator import fields, text
 from nlbench import systems
 from nlbench.filters import catalogue
@@ -29,6 +31,8 @@ def page(name: str) -> str:
         + ", ...}`. The defaults are the "
         "published values where there are any.",
         fields.of(systems.parameters(name)),
+        "## Its exact posterior",
+        reference(name),
         "## Filters for it",
         ", ".join(
             f"[{each}](../filters/{each}.md)"
@@ -37,6 +41,15 @@ def page(name: str) -> str:
         ),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def reference(name: str) -> str:
+    """What `reference: exact` is with the published parameters, in the words of the record that it is made of."""
+    made = systems.build(name).exact
+    if made is None:
+        return "None with these parameters. `reference: particles` runs a filter of 10,000 particles beside the others."
+    said = text.markdown((inspect.getdoc(type(made)) or "").partition("\n\n")[0])
+    return f"`reference: exact`, with these parameters: {said[0].lower()}{said[1:]}"
 
 
 def overview() -> str:

@@ -20,14 +20,11 @@ def report(
     """Draw figures and write the report from saved tables."""
     folder = found(where, settings, out)
     from nlbench import report as reports
-    from nlbench.errors import DamagedResults, EnvironmentFault
+    from nlbench.errors import DamagedResults
     from nlbench.results.folder import RunFolder
     from nlbench.results.results import Results
 
-    if RunFolder(folder).done_runs() is None and (folder / "batches").is_dir():
-        raise EnvironmentFault(
-            f"{folder}: the run is not finished; the command that began it goes on with it"
-        )
+    RunFolder(folder).check_finished()
     if faults := Results(folder).damaged():
         raise DamagedResults("\n".join(faults))
     page = reports.write(Results(folder))

@@ -10,7 +10,7 @@ import numpy as np
 
 from nlbench.comparison.per_run import PerRun, influences, per_run
 from nlbench.comparison.significance import Estimate, effective_degrees, standard_error
-from nlbench.errors import ConfigError, DamagedResults, EnvironmentFault
+from nlbench.errors import ConfigError, DamagedResults
 from nlbench.results.folder import MANIFEST, TABLES, RunFolder
 from nlbench.results.results import Results
 from nlbench.statistics.comparisons import UNKNOWN, Quantity, Tables
@@ -136,8 +136,5 @@ def _folder(folder: Path) -> Path:
             held = "no run" if not runs else f"{len(runs)} runs, name one: {', '.join(map(str, runs))}"
             raise ConfigError(f"{folder}: holds {held}")
         (folder,) = runs
-    if RunFolder(folder).done_runs() is None and (folder / "batches").is_dir():
-        raise EnvironmentFault(
-            f"{folder}: the run is not finished; the command that began it goes on with it"
-        )
+    RunFolder(folder).check_finished()
     return folder

@@ -21,7 +21,7 @@ from nlbench.engine.finish import of_totals
 from nlbench.engine.memory import memory_faults
 from nlbench.engine.problem import make
 from nlbench.engine.resume import numerics
-from nlbench.errors import ConfigError, DamagedResults
+from nlbench.errors import ConfigError
 from nlbench.results.fingerprint import differences
 from nlbench.results.folder import RunFolder
 from nlbench.results.manifest import versions
@@ -57,12 +57,9 @@ class Verified(NamedTuple):
 def verify(results: Results, block: int | None = None) -> Verified:
     """Check a run. block: which to compute again, a random one unless said. Writes nothing.
 
-    Raises `ConfigError` for a block that the run does not have, `DamagedResults` where the run was not finished.
+    Raises `ConfigError` for a block that the run does not have, `EnvironmentFault` where the run was not finished.
     """
-    if RunFolder(results.path).done_runs() is None:
-        raise DamagedResults(
-            f"{results.path}: the run is not finished; the command that began it goes on with it"
-        )
+    RunFolder(results.path).check_finished()
     if faults := results.damaged():
         return Verified(0, faults=tuple(faults))
     faults = results.unknown()

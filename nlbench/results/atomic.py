@@ -59,7 +59,7 @@ def write_fault(path: Path, error: OSError, needed: int | None = None) -> Enviro
     parts = [f"cannot write {path}: {error.strerror or error}"]
     if needed is not None:
         parts.append(f"needed {_size(needed)}")
-    free = _free(path)
+    free = free_disk(path)
     if free is not None:
         parts.append(f"free {_size(free)}")
     return EnvironmentFault(
@@ -67,9 +67,9 @@ def write_fault(path: Path, error: OSError, needed: int | None = None) -> Enviro
     )
 
 
-def _free(path: Path) -> int | None:
-    """Bytes free on the disk of the closest folder that exists."""
-    for folder in path.parents:
+def free_disk(path: Path) -> int | None:
+    """Bytes free on the disk where `path` is or would be made, None where that cannot be told."""
+    for folder in (path, *path.absolute().parents):
         try:
             return shutil.disk_usage(folder).free
         except OSError:

@@ -108,6 +108,13 @@ class RunFolder:
         write_manifest(self.path / MANIFEST, {**facts, "runs": runs, "checksums": checksums})
         atomic_write(self.path / DONE, f"{runs}\n".encode())
 
+    def check_finished(self) -> None:
+        """Raise `EnvironmentFault` where a run was begun here and not finished."""
+        if self.done_runs() is None and (self.path / BATCHES).is_dir():
+            raise EnvironmentFault(
+                f"{self.path}: the run is not finished; the command that began it goes on with it"
+            )
+
     def _check(self) -> None:
         """Raise `EnvironmentFault` where the folder is no longer the one that is held."""
         if self._removed():

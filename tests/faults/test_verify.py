@@ -13,7 +13,7 @@ import nlbench as nb
 from nlbench import engine
 from nlbench.cli.app import app
 from nlbench.engine import verification
-from nlbench.errors import ConfigError, DamagedResults
+from nlbench.errors import ConfigError, EnvironmentFault
 from nlbench.results.folder import CHECKPOINT, MANIFEST, RunFolder
 from nlbench.results.manifest import read_manifest
 from nlbench.results.results import Results
@@ -133,7 +133,7 @@ def test_an_unfinished_run_and_a_block_that_there_is_not_are_refused(folder):
     with pytest.raises(ConfigError, match="--block: got 16; the run has blocks 0 to 15"):
         engine.verify(folder, 16)
     (folder / "DONE").unlink()
-    with pytest.raises(DamagedResults, match="not finished"):
+    with pytest.raises(EnvironmentFault, match="not finished"):
         engine.verify(folder)
 
 

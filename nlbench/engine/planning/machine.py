@@ -1,9 +1,8 @@
-"""This machine and this process: how fast Python runs, memory in use and free, room on the disk."""
+"""This machine and this process: how fast Python runs, memory in use and free."""
 
 from __future__ import annotations
 
 import os
-import shutil
 import time
 from pathlib import Path
 
@@ -41,11 +40,3 @@ def free_memory() -> int:
         return min(free, limit - int((CGROUP / "memory.current").read_text()))
     except (OSError, ValueError):  # no such group, or one without a limit: "max"
         return free
-
-
-def free_disk(path: Path) -> int:
-    """Bytes free where `path` is or would be made."""
-    for folder in (path, *path.absolute().parents):
-        if folder.exists():
-            return shutil.disk_usage(folder).free
-    return shutil.disk_usage("/").free

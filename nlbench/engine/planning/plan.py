@@ -18,6 +18,7 @@ from nlbench.engine.planning.memory import memory
 from nlbench.engine.planning.precision import Chosen, needed, pilot_runs
 from nlbench.engine.problem import make
 from nlbench.engine.resume import finished_runs, resumed
+from nlbench.results import atomic
 from nlbench.results.folder import RunFolder
 from nlbench.statistics.consistency import consistency_table
 from nlbench.statistics.summary import tables
@@ -87,7 +88,7 @@ def plan(
         "memory_bytes": _summed(needs),
         "memory_free_bytes": machine.free_memory(),
         "disk_bytes": _summed(files),
-        "disk_free_bytes": machine.free_disk(Path(out)),
+        "disk_free_bytes": atomic.free_disk(Path(out)),
     }
 
 

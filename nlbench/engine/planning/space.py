@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from nlbench.engine.planning import machine, sizes
 from nlbench.engine.planning.memory import memory
 from nlbench.errors import EnvironmentFault
+from nlbench.results import atomic
 
 if TYPE_CHECKING:
     from nlbench.engine.compiled import Compiled
@@ -26,9 +27,9 @@ def require(compiled: Compiled, totals: Totals, runs: int, threads: int, folder:
         f"{what}: needs about {_size(wanted)}, free {_size(free)}"
         for what, wanted, free in (
             ("memory", sum(more.values()), machine.free_memory()),
-            (f"disk of {folder}", FILES * state, machine.free_disk(folder)),
+            (f"disk of {folder}", FILES * state, atomic.free_disk(folder)),
         )
-        if wanted > free
+        if free is not None and wanted > free
     ]
     if short:
         raise EnvironmentFault(
