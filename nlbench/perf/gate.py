@@ -47,7 +47,7 @@ def compared(
     known = [name for name in counts if name in baseline.entries]
     new = [name for name in counts if name not in baseline.entries]
     first = _decided(rounds, known, baseline, budget)
-    suspects = [name for name in known if _verdict(first[name], baseline, name, budget) == SLOWER]
+    suspects = [name for name in known if _change(first[name], baseline, name).suspect(budget)]
     second = _decided(rounds, suspects, baseline, budget)
     single = measured(rounds, new)
     found = []
@@ -57,19 +57,21 @@ def compared(
             continue
         entry = baseline.entries[name]
         now = second.get(name, first[name])
-        verdict = _verdict(now, baseline, name, budget)
-        if name in second and verdict != SLOWER:
-            verdict = UNDECIDED  # two batches do not agree
+        changed = _change(now, baseline, name)
+        verdict = changed.verdict(budget)
+        if name in second:
+            # At the limit of rounds two estimates beyond the budget count, though their bands reach below it.
+            verdict = SLOWER if changed.suspect(budget) else UNDECIDED
         more = risen(counts[name], entry.counts) if same_compiler else {}
         if more and verdict != SLOWER:
             verdict = COUNTS
-        found.append(Finding(name, now, entry, change(now, entry.log_ratio, entry.band), verdict, more))
+        found.append(Finding(name, now, entry, changed, verdict, more))
     return found
 
 
 def _decided(rounds: Rounds, names: Sequence[str], baseline: Baseline, budget: float) -> dict[str, Estimate]:
     """A batch until each workload is decided, if the limit of rounds allows."""
-    return _batch(rounds, names, lambda name, now: _verdict(now, baseline, name, budget) == UNDECIDED)
+    return _batch(rounds, names, lambda name, now: _change(now, baseline, name).verdict(budget) == UNDECIDED)
 
 
 def _batch(
@@ -89,6 +91,6 @@ def _batch(
     return estimates
 
 
-def _verdict(now: Estimate, baseline: Baseline, name: str, budget: float) -> str:
+def _change(now: Estimate, baseline: Baseline, name: str) -> Change:
     entry = baseline.entries[name]
-    return change(now, entry.log_ratio, entry.band).verdict(budget)
+    return change(now, entry.log_ratio, entry.band)

@@ -45,6 +45,10 @@ class Change(NamedTuple):
             return SLOWER
         return PASS if self.log + self.band < limit else UNDECIDED
 
+    def suspect(self, budget: float) -> bool:
+        """Whether it is slower for certain, and beyond the budget more likely than not."""
+        return self.log > max(math.log1p(budget), self.band)
+
 
 def estimate(seconds: np.ndarray) -> Estimate:
     """From (rounds, 2, 2) seconds: per round two pairs of kernel and workload."""
