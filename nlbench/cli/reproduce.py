@@ -85,7 +85,7 @@ def _ahead(needed: list[Job]) -> str:
     """What is to be done."""
     count = len(needed)
     runs = sum(job.runs for job in needed)
-    return f"{count} experiment{'s' if count > 1 else ''}, {runs:,} runs in all; those that are done are not run again"
+    return f"{count} experiment{'' if count == 1 else 's'}, {runs:,} runs in all; those that are done are not run again"
 
 
 class _Progress:

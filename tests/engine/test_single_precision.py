@@ -67,6 +67,20 @@ def test_a_derivative_that_vanishes_at_the_mean_is_none_that_was_lost():
     checked(swing)
 
 
+def test_what_float64_has_not_either_is_not_lost_and_what_it_has_is():
+    """A bearing from the origin has no derivative there; e^100 is 2.7e43."""
+
+    def seen(observe):
+        mean = nb.Moments(np.zeros(2), np.diag([0.0, 1.0]))
+        return nb.System(
+            drift=lambda t, x: -x, observe=observe, measurement_cov=np.eye(1), initial=mean, interval=1.0
+        )
+
+    checked(seen(lambda t, x: jnp.arctan2(x[:1], 0 * x[1:])))
+    with pytest.raises(ConfigError, match="observe: values in float32 are lost"):
+        checked(seen(lambda t, x: jnp.exp(100 + x[:1])))
+
+
 def test_in_discrete_time_too():
     far = nb.DiscreteSystem(
         transition=lambda k, x, w: 1e-30 * x**5 + w,
