@@ -52,10 +52,11 @@ class Sleeping:
     """Blocks that take a known time; the sums are real, of the first block."""
 
     def __init__(self, compiled, seconds):
-        self.problem, self.seconds, self.computed = compiled.problem, seconds, []
+        self.problem, self.executables = compiled.problem, compiled.executables
+        self.seconds, self.computed = seconds, []
         self._sums = compiled.sums(0, 1, compiled.problem.block)
 
-    def sums(self, first, count, runs):
+    def sums(self, first, count, runs, device):
         time.sleep(count * self.seconds)
         self.computed += range(first, first + count)
         return {name: np.repeat(value, count, axis=0) for name, value in self._sums.items()}
