@@ -59,7 +59,9 @@ def _differences(runner: Runner) -> Iterator[tuple[str, int, float]]:
             found = _at(derivative, points, deviations, order, False)
             there = np.isfinite(exact)  # what float64 has not, float32 does not lose
             largest = np.abs(exact).max((0, 2), where=there, initial=0.0)
-            apart = np.nan_to_num(np.abs(found - exact), nan=np.inf, posinf=np.inf).max((0, 2), where=there, initial=0.0)
+            apart = np.nan_to_num(np.abs(found - exact), nan=np.inf, posinf=np.inf).max(
+                (0, 2), where=there, initial=0.0
+            )
             with np.errstate(divide="ignore", invalid="ignore"):
                 share = np.max(np.where(apart == 0, 0.0, apart / largest), initial=0.0)
             if share > APART:
