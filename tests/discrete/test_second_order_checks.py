@@ -91,6 +91,7 @@ def test_a_gaussian_sum_has_the_mean_and_covariance_that_it_was_laid_out_from():
     np.testing.assert_allclose(moments.cov, initial.cov, rtol=1e-13)
 
 
+@pytest.mark.long
 def test_a_gaussian_sum_nears_the_exact_posterior_of_two_modes():
     """y = x^2/2 seen as 2 from m = .3: modes at +-2. What is missing of Bayes's mean and variance, by sums, is of
     first order in the variance that each member is left with; one EKF is far off."""

@@ -224,6 +224,7 @@ def test_a_filter_of_samples_draws_its_own_in_every_trajectory(name, tmp_path):
     assert abs(np.corrcoef(apart[:-1], apart[1:])[0, 1]) < 4 / np.sqrt(count)
 
 
+@pytest.mark.long
 def test_chunk_and_threads_do_not_change_one_byte(tmp_path):
     given = {"filters": ["ekf", {"name": "bootstrap", "particles": 20}], "monte_carlo": {"runs": 100}}
     plain, other = (
@@ -233,6 +234,7 @@ def test_chunk_and_threads_do_not_change_one_byte(tmp_path):
     assert table_bytes(plain.path) == table_bytes(other.path)
 
 
+@pytest.mark.long
 def test_topping_up_equals_a_straight_run(tmp_path):
     straight = run(linear(), tmp_path / "straight", monte_carlo={"runs": 100})
     for runs in (70, 100):
@@ -240,6 +242,7 @@ def test_topping_up_equals_a_straight_run(tmp_path):
     assert table_bytes(straight.path) == table_bytes(topped.path)
 
 
+@pytest.mark.long
 def test_another_system_gets_another_folder(tmp_path):
     first, again, other = (
         run(system, tmp_path, monte_carlo={"runs": 8}, engine={"block": 8}).path

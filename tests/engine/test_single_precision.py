@@ -95,12 +95,14 @@ def test_in_discrete_time_too():
 
 
 def test_a_run_in_float32_is_refused_and_writes_nothing(tmp_path):
-    program = (
-        "import sys; from nlbench.cli import main\n"
-        "sys.argv = ['nlbench', 'run', 'configs/culver/orbit.yaml', '--set', 'engine.precision=float32', "
-        "'--set', 'reference=null', '--out', sys.argv[1]]; main()"
+    file = tmp_path / "orbit.yaml"
+    file.write_text(
+        "experiment: orbit\nsystem: {name: lunar-orbit, sightings: false}\nfilters: [ekf]\n"
+        "time: {end: 1000, step: 50, output: 500}\nengine: {precision: float32}\n"
     )
-    done = python(program, str(tmp_path / "out"))
+    done = python(
+        "import sys; from nlbench.cli import main; main()", "run", str(file), "--out", str(tmp_path / "out")
+    )
     assert done.returncode == 2, done.stderr
     assert "drift: first derivatives in float32" in done.stderr
     assert not (tmp_path / "out").exists()

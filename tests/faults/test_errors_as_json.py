@@ -33,6 +33,7 @@ def test_a_mistake_in_the_file_too(tmp_path):
 
 
 def test_verify_says_what_it_found_once(tmp_path):
+    (tmp_path / "batches").mkdir()  # a run was begun here
     done = CliRunner().invoke(app, ["verify", str(tmp_path), "--json"])
     assert done.exit_code == 5
     assert json.loads(done.stdout) == {"exit_code": 5, "error": done.stderr.rstrip("\n")}

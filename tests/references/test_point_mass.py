@@ -121,6 +121,7 @@ def growth_by_quadrature(y, nodes=4000):
         yield mean, np.sum(c * p * (x - mean) ** 2), np.sum(c * p * (x - mean) ** 3), level
 
 
+@pytest.mark.long
 def test_the_growth_model_is_quadrature_at_other_points():
     found = run(build(GROWTH, GRID), Y)
     for (moments, info), (mean, variance, third, level) in zip(found, growth_by_quadrature(Y), strict=True):

@@ -67,6 +67,7 @@ def test_a_linear_system_moves_with_its_moments_to_second_order_in_the_spacing()
     assert found[-1] < 1e-3
 
 
+@pytest.mark.long
 def test_a_nonlinear_system_moves_with_second_order_in_the_spacing():
     """Against sixteen times as many cells as the coarsest grid, whose own error makes the last ratio 4.2."""
     cubic = scalar(lambda t, x: x - x**3, lambda t, x: 0.5 + 0.1 * jnp.sin(x), initial=(0.3, 0.3))

@@ -28,7 +28,10 @@ TRUE = {"mean_error": 0 * SCALE, "rms": np.sqrt(2) * SCALE, "variance_actual": 2
 TRUE |= {"rms_clipped": TRUE["rms"], "third_actual": 2 * SCALE**3}
 
 
-@pytest.fixture(scope="module", params=[1280, 2560], ids=["delta", "jackknife"])
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(1280, id="delta"), pytest.param(2560, id="jackknife", marks=pytest.mark.long)],
+)
 def experiments(request):
     """Tables of statistics and of paired differences, an experiment at each time; 1,280 runs fill 20 groups."""
     runs = request.param

@@ -141,6 +141,7 @@ def test_cartesian_and_polar_filters_see_the_same_runs(tmp_path):
     assert kept.loc["polar"].range.std() > 1000.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "changes", [{"coordinates": "polar"}, pytest.param({"sightings": False}, marks=pytest.mark.long)]
 )
