@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TextIO
 
-from nlbench.errors import NlbenchError
+from nlbench.errors import NlbenchError, printable
 
 WIDTH = 80
 STYLES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33"}
@@ -25,9 +25,9 @@ def styled(text: str, style: str, stream: TextIO | None = None) -> str:
 
 
 def complain(message: str) -> None:
-    """An error, on stderr."""
+    """An error, on stderr; names of files may hold characters that command a terminal."""
     sys.stdout.flush()
-    print(message, file=sys.stderr)
+    print(printable(message), file=sys.stderr)
 
 
 def next_step(command: str, why: str) -> None:

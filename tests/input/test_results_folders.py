@@ -83,6 +83,7 @@ def unrepaired(undisturbed, tmp_path, number):
         # What lies in the way is named, and removed by who put it there.
         named = any(str(each) in str(fault) for each in (folder, *folder.iterdir()))
         in_the_way = [each for each in folder.rglob("*") if not each.is_file() or each.is_symlink()]
+        in_the_way += [each for each in (folder / "tables", folder / "batches") if each.is_file()]
         return [] if named and in_the_way else [f"{done}: {fault}"]
     same = table_bytes(path) == table_bytes(undisturbed)
     return [f"{done}: {each}" for each in [*Results(path).damaged(), *([] if same else ["other tables"])]]
