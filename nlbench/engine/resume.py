@@ -25,7 +25,11 @@ def finished_runs(folder: RunFolder) -> int | None:
     try:
         done = folder.done_runs()
         if done is not None:
-            Results(folder.path).check_done()
+            results = Results(folder.path)
+            results.check_done()
+            _ = results.manifest[
+                "runs"
+            ]  # without a sound manifest the mark is not believed: it may be edited, too
     except DamagedResults as fault:
         log.warning("%s; it is written anew", fault)
         return None
