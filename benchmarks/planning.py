@@ -2,9 +2,10 @@
 
     python -m benchmarks.planning [--rounds 3] [--seconds 60] ["FILE key=value ..." ...]
 
-Each round plans and then runs each experiment in processes of their own, into an empty folder, with as many runs as
-take about `--seconds` by a first plan. On a machine with other work the two see different machines: rounds alternate,
-and the medians of their ratios count.
+Each round plans and then runs each experiment in processes of their own, into an empty folder and with an empty cache
+of compiled programs, as someone does who does it for the first time; with as many runs as take about `--seconds` by a
+first plan. On a machine with other work the two see different machines: rounds alternate, and the medians of their
+ratios count.
 """
 
 from __future__ import annotations
@@ -56,7 +57,9 @@ def main() -> None:
     print("planned / actual: time, memory, disk")
     for _ in range(given.rounds):
         for file in given.files:
-            planned, actual = _planned(file, runs[file]), _actual(file, runs[file])
+            with tempfile.TemporaryDirectory() as cache:
+                os.environ["NLBENCH_CACHE"] = cache
+                planned, actual = _planned(file, runs[file]), _actual(file, runs[file])
             ratios[file].append(Cost(*(a / b for a, b in zip(planned, actual, strict=True))))
             print(f"{file}, {runs[file]:,} runs: {_words(planned, actual)}", flush=True)
     print("medians")
@@ -74,7 +77,7 @@ def _words(planned: Cost, actual: Cost) -> str:
 
 
 def _runs(file: str, seconds: float) -> int:
-    """Runs that take about so long, by a plan, which also fills the cache of compiled programs."""
+    """Runs that take about so long, by a plan."""
     plan = _plan(file, 10_000)
     rest = plan["seconds"]["total"] - plan["seconds"]["run"]
     return max(1_000, int(10_000 * max(seconds - rest, 0.2 * seconds) / plan["seconds"]["run"]))

@@ -53,7 +53,7 @@ def cost_table(problem: Problem, seed: int) -> pd.DataFrame:
             *pool.map(partial(_compiled, problem, data), problem.runners), strict=True
         )
     seconds = _seconds(programs, data, blocks)
-    counted = [operations(problem, runner) for runner in problem.runners]
+    counted = operations(problem)
     return pd.DataFrame(
         {
             "filter": [runner.label for runner in problem.runners],
@@ -105,8 +105,12 @@ def _timed(program: Any, data: Simulated, count: int) -> float:
     return time.perf_counter() - begun
 
 
-def operations(problem: Problem, runner: Runner) -> tuple[int, int]:
-    """Arithmetic operations of one integration step and of one update, of one trajectory."""
+def operations(problem: Problem) -> list[tuple[int, int]]:
+    """Arithmetic operations of one integration step and of one update, of one trajectory, for each filter."""
+    return [_operations(problem, runner) for runner in problem.runners]
+
+
+def _operations(problem: Problem, runner: Runner) -> tuple[int, int]:
     filter = runner.filter
     state = filter.init(runner.initial)
     y, start = jnp.zeros(problem.truth.measurements), problem.schedule.segment_times[0]

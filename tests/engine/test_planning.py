@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import nlbench as nb
-from nlbench import engine, report
+from nlbench import engine, report, schedule
 from nlbench.engine.compiled import compile_chunks
-from nlbench.engine.planning import calibration, sizes, space
+from nlbench.engine.planning import calibration, durations, sizes, space
 from nlbench.engine.planning.compilation import LOADING, listening
 from nlbench.engine.planning.memory import memory
 from nlbench.engine.problem import make
@@ -110,6 +111,21 @@ def test_a_longer_run_costs_what_is_missing(planned_and_run):
     whole = RUNS // 64  # the last, partial block is not in the checkpoint
     assert longer["runs_done"] == 64 * whole
     assert longer["blocks_left"] == -(-10 * RUNS // 64) - whole
+
+
+def test_each_filter_is_timed_by_its_share_of_the_operations():
+    """100 steps, 20 updates of (10, 5) and of (30, 25): 1,100 operations against 3,500, and one more for each."""
+    steps = schedule.make(1.0, 0.01, 0.5, 0.05)
+    found = durations.shares(SimpleNamespace(schedule=steps), [(10, 5), (30, 25)])
+    assert found == pytest.approx((1101 / 4602, 3501 / 4602))
+
+
+def test_a_dear_filter_costs_its_first_rounds_and_a_cheap_one_all_of_them():
+    """A block of a second: warmed up and timed once, then as often as two seconds allow, each time after a call that is
+    not timed. One of 2 ms: seven rounds of 16 blocks."""
+    problem = SimpleNamespace(schedule=schedule.make(1.0, 0.01, 0.5, 0.05), block=64)
+    assert durations._timing(problem, 1.0) == pytest.approx(1.0 * (2 + 2 * 2))
+    assert durations._timing(problem, 0.002) == pytest.approx(0.002 * (2 + 7 * 17))
 
 
 def size(path, names):

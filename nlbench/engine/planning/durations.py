@@ -36,12 +36,15 @@ class Work(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """What was measured here: seconds to state the problem, of bounds and of tables; how much slower than on the
-    reference machine Python runs; the program's compilation; the calibration."""
+    """What was measured here: seconds to state the problem, of bounds, of tables and to count operations; each filter's
+    share of the operations; how much slower than on the reference machine Python runs; the program's compilation; the
+    calibration."""
 
     problem: float
     bounds: float
     tables: float
+    counting: float
+    shares: tuple[float, ...]
     slowness: float
     compilation: Compilation
     calibration: Calibration
@@ -70,19 +73,30 @@ def durations(problem: Problem, work: Work, measured: Measured, threads: int) ->
 
 
 def _cost_table(problem: Problem, measured: Measured, threads: int) -> float:
-    """Each filter is compiled alone, as many at a time as there are threads, and timed."""
+    """Each filter is compiled alone, as many at a time as there are threads, and timed; operations are counted."""
     compilation, share = measured.compilation, measured.calibration.share
-    at_once = min(threads, len(problem.runners))
-    alone = ALONE * (compilation.trace + compilation.compile / at_once)
-    # One thread by itself, on the blocks of one filter, if all filters cost the same.
-    block = measured.calibration.seconds_per_block * threads * share / len(problem.runners)
+    alone = ALONE * (compilation.trace + compilation.compile / min(threads, len(problem.runners)))
+    block = measured.calibration.seconds_per_block * threads * share  # one thread by itself, all filters
+    timed = sum(_timing(problem, block * part) for part in measured.shares)
+    return alone + timed / share + measured.counting
+
+
+def _timing(problem: Problem, block: float) -> float:
+    """Seconds to time a filter that takes so long for a block."""
     count = max(1, min(_blocks_timed(problem), int(cost.PASS_SECONDS / block)))
     rounds = min(cost.ROUNDS, int(cost.FILTER_SECONDS / (block * count)))
-    timed = block * (2 + rounds * (count + 1)) * len(problem.runners)
-    return alone + timed / share
+    return block * (2 + rounds * (count + 1))
 
 
 def _blocks_timed(problem: Problem) -> int:
     schedule = problem.schedule
     steps = schedule.segments * schedule.segment_steps * problem.block
     return max(1, min(cost.MOST_BLOCKS, cost.MOST_STEPS // steps))
+
+
+def shares(problem: Problem, counted: list[tuple[int, int]]) -> tuple[float, ...]:
+    """Each filter's part of all operations of a run, from those of one step and of one update."""
+    schedule = problem.schedule
+    steps, updates = schedule.segments * schedule.segment_steps, schedule.measurements or schedule.sightings
+    whole = [step * steps + update * updates + 1 for step, update in counted]  # 1: a filter may do nothing
+    return tuple(each / sum(whole) for each in whole)

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from nlbench import runtime
+from nlbench.engine import cost
 from nlbench.engine.bounds import bounds_table
 from nlbench.engine.compiled import compile_chunks
 from nlbench.engine.planning import machine, sizes
 from nlbench.engine.planning.calibration import calibrate, extend
 from nlbench.engine.planning.compilation import listening
-from nlbench.engine.planning.durations import Measured, Work, durations
+from nlbench.engine.planning.durations import Measured, Work, durations, shares
 from nlbench.engine.planning.memory import memory
 from nlbench.engine.planning.precision import Chosen, needed, pilot_runs
 from nlbench.engine.problem import make
@@ -78,7 +79,17 @@ def plan(
     pictures = _pictures(experiment, problem, calibration.totals)
     values = min(left.runs, problem.layout.keep_runs) * len(experiment.labels) * len(problem.layout.reports)
     work = Work(left.blocks, values, files["checkpoint"], pictures, len(experiment.claims), left.finished)
-    measured = Measured(stated, bounds, tabled, machine.slowness(), heard.compilation(seconds), calibration)
+    counted, counting = _timed(lambda: cost.operations(problem))
+    measured = Measured(
+        stated,
+        bounds,
+        tabled,
+        counting,
+        shares(problem, counted),
+        machine.slowness(),
+        heard.compilation(seconds),
+        calibration,
+    )
     needs = memory(compiled, problem, files["checkpoint"], values, threads, held, held - before)
     return {
         **_counts(experiment, problem, left),
