@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nlbench.statistics.ieee import ieee
 from nlbench.statistics.layout import Layout
 from nlbench.statistics.totals import Totals
 from nlbench.statistics.uncertainty import Sums, enough_groups, jackknife
@@ -31,6 +32,7 @@ class Average(NamedTuple):
     root: bool = False
 
 
+@ieee
 def estimate(statistic: str, times: tuple, coordinates: tuple[str, ...], average: Average) -> Estimate:
     """Value and standard error: jackknife if enough groups are filled, otherwise the delta method."""
 
@@ -42,12 +44,11 @@ def estimate(statistic: str, times: tuple, coordinates: tuple[str, ...], average
     count = np.broadcast_to(average.runs, shape).astype(np.float64)
     sums = {"count": count, "first": average.first.astype(np.float64)}
     n, first, second = count.sum(0), average.first.sum(0), average.second.sum(0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        value = value_of({"count": n, "first": first})
-        variance = np.maximum(second / n - (first / n) ** 2, 0) / (n - 1)
-        # The derivative of factor sqrt(mean) is factor^2 / (2 value); where the root is 0, all terms are.
-        slope = np.where(value > 0, average.factor**2 / (2 * value), 0.0) if average.root else average.factor
-        delta = np.where(n > 1, np.abs(slope) * np.sqrt(variance), np.nan)
+    value = value_of({"count": n, "first": first})
+    variance = np.maximum(second / n - (first / n) ** 2, 0) / (n - 1)
+    # The derivative of factor sqrt(mean) is factor^2 / (2 value); where the root is 0, all terms are.
+    slope = np.where(value > 0, average.factor**2 / (2 * value), 0.0) if average.root else average.factor
+    delta = np.where(n > 1, np.abs(slope) * np.sqrt(variance), np.nan)
     stderr = np.where(enough_groups(count), jackknife(value_of, sums, count), delta)
     return Estimate(statistic, times, coordinates, value, stderr, n.astype(np.int64))
 

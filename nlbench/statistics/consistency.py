@@ -13,12 +13,14 @@ import numpy as np
 import pandas as pd
 
 from nlbench.statistics.chi_square import quantile
+from nlbench.statistics.ieee import ieee
 from nlbench.statistics.totals import Totals
 
 TAIL = 0.025
 COLUMNS = ("filter", "time", "score", "value", "stderr", "low", "high", "dof", "n", "consistent")
 
 
+@ieee
 def consistency_table(totals: Totals, statistics: pd.DataFrame, measurements: int) -> pd.DataFrame:
     """`filter, time, score, value, stderr, low, high, dof, n, consistent` of the joint NEES and the NIS.
 
@@ -32,8 +34,7 @@ def consistency_table(totals: Totals, statistics: pd.DataFrame, measurements: in
     dof = np.where(nis, measurements, len(layout.coordinates))
     n, value = rows["n"].to_numpy(), rows["value"].to_numpy()
     bounded = np.where((n > 0) & ~(nis & _selected(totals, rows)), n, 0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        low, high = (quantile(tail, bounded * dof) / n for tail in (TAIL, 1 - TAIL))
+    low, high = (quantile(tail, bounded * dof) / n for tail in (TAIL, 1 - TAIL))
     consistent = pd.array((low <= value) & (value <= high), dtype="boolean")
     consistent[bounded == 0] = pd.NA
     made = rows.rename(columns={"statistic": "score"}).assign(

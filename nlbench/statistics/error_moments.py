@@ -8,11 +8,13 @@ from collections.abc import Callable
 import numpy as np
 
 from nlbench.statistics.averages import Estimate
+from nlbench.statistics.ieee import ieee
 from nlbench.statistics.powers import shifted
 from nlbench.statistics.totals import Totals
 from nlbench.statistics.uncertainty import Sums, enough_groups, jackknife
 
 
+@ieee
 def error_moments(totals: Totals) -> list[Estimate]:
     """The four statistics at every output time, for runs that are not lost then."""
     layout, groups = totals.layout, totals.groups
@@ -29,9 +31,8 @@ def error_moments(totals: Totals) -> list[Estimate]:
         def value_of(part: Sums, formula: Callable = formula) -> np.ndarray:
             return formula(pivot, *(part[f"d{k}"] / part["n"] for k in (1, 2, 3)))
 
-        with np.errstate(invalid="ignore", divide="ignore"):
-            value = value_of(total)
-            delta = np.where(n > 1, np.sqrt(np.maximum(variances[statistic], 0) / (n - 1)), np.nan)
+        value = value_of(total)
+        delta = np.where(n > 1, np.sqrt(np.maximum(variances[statistic], 0) / (n - 1)), np.nan)
         stderr = np.where(enough_groups(weight), jackknife(value_of, sums, weight), delta)
         factor = scale**order
         coordinates = layout.coordinates
@@ -73,16 +74,15 @@ def _delta_variances(n: np.ndarray, power: np.ndarray, pivot: np.ndarray) -> dic
     With x the deviation from the mean m and c_k its moments: mean x; variance x^2 - c2; third
     x^3 - c3 - 3 c2 x; rms (x^2 - c2 + 2 m x) / (2 rms).
     """
-    with np.errstate(invalid="ignore", divide="ignore"):
-        raw = np.concatenate([np.ones((1, *n.shape)), power / n])
-        _, _, c2, c3, c4, _, c6 = shifted(raw, -raw[1])
-        mean = pivot + raw[1]
-        square = c4 - c2**2
-        rms_squared = c2 + mean**2
-        rms = (square + 4 * mean * c3 + 4 * mean**2 * c2) / (4 * rms_squared)
-        return {
-            "mean_error": c2,
-            "variance_actual": square,
-            "third_actual": c6 - c3**2 - 6 * c2 * c4 + 9 * c2**3,
-            "rms": np.where(rms_squared > 0, rms, 0.0 * n),
-        }
+    raw = np.concatenate([np.ones((1, *n.shape)), power / n])
+    _, _, c2, c3, c4, _, c6 = shifted(raw, -raw[1])
+    mean = pivot + raw[1]
+    square = c4 - c2**2
+    rms_squared = c2 + mean**2
+    rms = (square + 4 * mean * c3 + 4 * mean**2 * c2) / (4 * rms_squared)
+    return {
+        "mean_error": c2,
+        "variance_actual": square,
+        "third_actual": c6 - c3**2 - 6 * c2 * c4 + 9 * c2**3,
+        "rms": np.where(rms_squared > 0, rms, 0.0 * n),
+    }

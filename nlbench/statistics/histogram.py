@@ -7,6 +7,8 @@ inside it errs by about 1e-5 of the value, a tenth of the standard error of a me
 
 import numpy as np
 
+from nlbench.statistics.ieee import ieee
+
 LOWEST, HIGHEST = -40, 16  # octaves: 1e-12 to 65,536 in units of the scale
 PER_OCTAVE = 64
 BINS = (HIGHEST - LOWEST) * PER_OCTAVE + 2  # the first also holds all below, the last all above and lost
@@ -25,6 +27,7 @@ def edges() -> np.ndarray:
     return np.concatenate([[0.0], np.ldexp(1 + step / PER_OCTAVE, octave + LOWEST), [np.inf]])
 
 
+@ieee
 def quantile(counts: np.ndarray, fraction: float | np.ndarray) -> np.ndarray:
     """The value below which `fraction` of the counts (..., BINS) lie; infinite inside the last bin."""
     below = np.concatenate([np.zeros((*counts.shape[:-1], 1)), np.cumsum(counts, axis=-1)], axis=-1)
@@ -32,7 +35,6 @@ def quantile(counts: np.ndarray, fraction: float | np.ndarray) -> np.ndarray:
     chosen = np.clip((below < target).sum(-1, keepdims=True) - 1, 0, BINS - 1)
     start, stop = (np.take_along_axis(below, chosen + i, -1)[..., 0] for i in (0, 1))
     left, right = (edges()[chosen[..., 0] + i] for i in (0, 1))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        inside = left + (right - left) * (target[..., 0] - start) / (stop - start)
+    inside = left + (right - left) * (target[..., 0] - start) / (stop - start)
     value = np.where(chosen[..., 0] == BINS - 1, np.inf, inside)
     return np.where(below[..., -1] > 0, value, np.nan)

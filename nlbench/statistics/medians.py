@@ -8,11 +8,13 @@ import numpy as np
 
 from nlbench.statistics import histogram
 from nlbench.statistics.averages import Estimate
+from nlbench.statistics.ieee import ieee
 from nlbench.statistics.kept import magnitudes
 from nlbench.statistics.totals import Totals
 from nlbench.statistics.uncertainty import NORMAL_975
 
 
+@ieee
 def medians(totals: Totals) -> Estimate:
     """Exact while all runs are kept, otherwise from the histograms."""
     layout, n = totals.layout, totals.runs
@@ -28,7 +30,6 @@ def medians(totals: Totals) -> Estimate:
     else:
         scale = np.array(layout.scale)
         value, low, high = (scale * histogram.quantile(totals.histogram, fraction) for fraction in fractions)
-    with np.errstate(invalid="ignore"):
-        stderr = np.where(np.isinf(value), np.nan, (high - low) / (2 * NORMAL_975))
+    stderr = np.where(np.isinf(value), np.nan, (high - low) / (2 * NORMAL_975))
     count = np.full(value.shape, n, np.int64)
     return Estimate("median_error", layout.report_times, layout.magnitudes, value, stderr, count)

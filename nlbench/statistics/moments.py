@@ -3,11 +3,13 @@
 import numpy as np
 import pandas as pd
 
+from nlbench.statistics.ieee import ieee
 from nlbench.statistics.layout import Layout
 from nlbench.statistics.totals import Totals
 from nlbench.statistics.uncertainty import JACKKNIFE_GROUPS, Sums, enough_groups, jackknife
 
 
+@ieee
 def moments_table(totals: Totals) -> pd.DataFrame:
     """`filter, time, indices, estimated, actual, stderr, n, names, estimated_stderr`.
 
@@ -31,15 +33,14 @@ def moments_table(totals: Totals) -> pd.DataFrame:
         first, second, third = (part[name] / part["n"] for name in ("first", "second", "third"))
         return _central(first, second, third, layout)
 
-    with np.errstate(invalid="ignore", divide="ignore"):
-        total = {name: value.sum(0) for name, value in sums.items()}
-        actual = actual_of(total)
-        stated = np.concatenate([groups["estimated_second"], groups["estimated_third"]], axis=-1)
-        weight = np.broadcast_to(alive, stated.shape)
-        estimated = _mean({"stated": stated.sum(0), "n": total["n"]})
-        estimated_stderr = np.where(
-            enough_groups(weight), jackknife(_mean, {"stated": stated, "n": alive}, weight), np.nan
-        )
+    total = {name: value.sum(0) for name, value in sums.items()}
+    actual = actual_of(total)
+    stated = np.concatenate([groups["estimated_second"], groups["estimated_third"]], axis=-1)
+    weight = np.broadcast_to(alive, stated.shape)
+    estimated = _mean({"stated": stated.sum(0), "n": total["n"]})
+    estimated_stderr = np.where(
+        enough_groups(weight), jackknife(_mean, {"stated": stated, "n": alive}, weight), np.nan
+    )
     if totals.filled_groups >= JACKKNIFE_GROUPS or not totals.all_kept:
         stderr = unit * jackknife(actual_of, sums, np.broadcast_to(alive, (*alive.shape[:-1], len(unit))))
     else:

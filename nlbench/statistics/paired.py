@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
+from nlbench.statistics.ieee import ieee
 from nlbench.statistics.kept import magnitudes
 from nlbench.statistics.totals import Totals
 from nlbench.statistics.uncertainty import JACKKNIFE_GROUPS, Sums, jackknife, p_value
@@ -18,6 +19,7 @@ COLUMNS = ("filter_a", "filter_b", "time", "coordinate", "statistic", "differenc
 STATISTICS = ("rms", "rms_clipped", "mean_error")
 
 
+@ieee
 def paired_table(totals: Totals) -> pd.DataFrame:
     """A row for each pair of filters (in file order), report time, magnitude and statistic: a minus b."""
     layout = totals.layout
@@ -63,8 +65,7 @@ def _difference(totals: Totals, statistic: str) -> tuple[np.ndarray, np.ndarray,
             np.sqrt(np.maximum(part["a"], 0) / part["n"]) - np.sqrt(np.maximum(part["b"], 0) / part["n"])
         )
 
-    with np.errstate(invalid="ignore", divide="ignore"):
-        value = value_of({name: part.sum(0) for name, part in sums.items()})
+    value = value_of({name: part.sum(0) for name, part in sums.items()})
     weight = np.broadcast_to(sums["n"], (len(both), *value.shape))
     return value, jackknife(value_of, sums, weight), weight.sum(0)
 
@@ -98,6 +99,5 @@ def _influences(totals: Totals) -> Iterator[tuple[int, int, str, np.ndarray]]:
 def _rms_influence(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     if a.shape[-1] == 0:
         return np.zeros_like(a)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        halves = [square / (2 * np.sqrt(square.mean(-1, keepdims=True))) for square in (a, b)]
+    halves = [square / (2 * np.sqrt(square.mean(-1, keepdims=True))) for square in (a, b)]
     return halves[0] - halves[1]

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from nlbench.statistics.averages import Average, Estimate, estimate
+from nlbench.statistics.ieee import ieee
 from nlbench.statistics.totals import Totals
 from nlbench.statistics.uncertainty import Sums, enough_groups, jackknife
 
@@ -30,6 +31,7 @@ def scored(totals: Totals) -> list[Estimate]:
     ]
 
 
+@ieee
 def _mean_of_samples(times: tuple, sums: np.ndarray) -> Estimate:
     """The ratio r = sum a / sum c of NIS and samples; runs are independent, the samples of a run need not be.
 
@@ -42,9 +44,8 @@ def _mean_of_samples(times: tuple, sums: np.ndarray) -> Estimate:
 
     runs, c, a, aa, ac, cc = sums.sum(1)
     parts = {"a": sums[2], "c": sums[1]}
-    with np.errstate(invalid="ignore", divide="ignore"):
-        value = value_of({"a": a, "c": c})
-        residual = np.maximum(aa - 2 * value * ac + value**2 * cc, 0)
-        delta = np.where(runs > 1, np.sqrt(residual * runs / (runs - 1)) / c, np.nan)
+    value = value_of({"a": a, "c": c})
+    residual = np.maximum(aa - 2 * value * ac + value**2 * cc, 0)
+    delta = np.where(runs > 1, np.sqrt(residual * runs / (runs - 1)) / c, np.nan)
     stderr = np.where(enough_groups(sums[1]), jackknife(value_of, parts, sums[1]), delta)
     return Estimate("nis", times, ("all",), value, stderr, c.astype(np.int64))

@@ -14,6 +14,7 @@ import pandas as pd
 
 from nlbench.statistics.claim import Claim
 from nlbench.statistics.comparisons import Quantity, terms
+from nlbench.statistics.ieee import ieee
 from nlbench.statistics.uncertainty import NORMAL_975, wilson
 
 SIZES = (10, 20, 80)  # the runs of a test in Culver 1969; Schwartz 1967 made ten
@@ -58,6 +59,7 @@ class KeptTable:
         """Numbers of the runs of each set, (sets, size)."""
         return np.random.default_rng((SEED, size)).integers(0, self.count, (sets, size))
 
+    @ieee
     def value(self, quantity: Quantity, drawn: np.ndarray) -> np.ndarray | None:
         """The statistic of each set, (sets,); None where it cannot be had from what was kept."""
         members = self.norms.get(quantity.coordinate, [quantity.coordinate])
@@ -74,11 +76,10 @@ class KeptTable:
         if found is None or formula is None or (norm and quantity.statistic not in OF_NORMS):
             return None
         *parts, lost = (column[drawn] for column in found)
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            if quantity.statistic in OF_NORMS:
-                size = np.sqrt(sum(part**2 for part in parts)) if norm else np.abs(parts[0])
-                return formula(size, lost, self.clip.get(quantity.coordinate, math.inf))
-            return formula(*parts, ~lost)
+        if quantity.statistic in OF_NORMS:
+            size = np.sqrt(sum(part**2 for part in parts)) if norm else np.abs(parts[0])
+            return formula(size, lost, self.clip.get(quantity.coordinate, math.inf))
+        return formula(*parts, ~lost)
 
 
 def sets_table(claims: Iterable[Claim], kept: KeptTable, source_runs: int | None) -> pd.DataFrame:
@@ -100,6 +101,7 @@ def sets_table(claims: Iterable[Claim], kept: KeptTable, source_runs: int | None
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
+@ieee
 def _shown(
     claim: Claim, kept: KeptTable, drawn: np.ndarray, values: dict[Quantity, np.ndarray | None]
 ) -> np.ndarray | None:
@@ -112,8 +114,7 @@ def _shown(
         of = [values[quantity] for quantity in term.quantities]
         if any(each is None for each in of):
             return None
-        with np.errstate(invalid="ignore", divide="ignore"):
-            here = np.asarray(term.margin(of)) < 0
+        here = np.asarray(term.margin(of)) < 0
         shown = here if shown is None else shown & here
     return shown
 

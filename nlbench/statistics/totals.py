@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from nlbench.statistics import histogram
+from nlbench.statistics.ieee import ieee
 from nlbench.statistics.kept import KeptRuns, Reported, magnitudes
 from nlbench.statistics.layout import GROUPS, Layout
 from nlbench.statistics.powers import shifted
@@ -52,6 +53,7 @@ class Totals:
         self._pairs, self._triples = np.array(pairs).T, np.array(triples).T
         self._rest = np.array([[pairs.index(t[:gone] + t[gone + 1 :]) for t in triples] for gone in range(3)])
 
+    @ieee
     def add(self, first: int, sums: Mapping[str, Any]) -> None:
         """Add the sums of blocks first, first + 1, ..., stacked along a leading axis; `first` must be the next block.
 

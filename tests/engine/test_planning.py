@@ -174,7 +174,7 @@ def test_the_memory_of_calls_is_that_of_the_arrays_they_return(compiled):
     arrays = sum(array.nbytes for array in compiled.sums(0, 64, 64 * 64).values())
     program = sizes.program(compiled)
     assert arrays <= program["output"] < 1.1 * arrays
-    needs = memory(compiled, compiled.problem, 0, 0, threads=2, held=0, grown=0)
+    needs = memory(compiled, compiled.problem, 0, 0, threads=2, process=0)
     assert needs["calls"] >= 2 * (program["temp"] + 3 * program["output"])
 
 

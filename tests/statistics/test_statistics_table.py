@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nlbench.statistics.summary import STATISTICS, statistics_table
+from nlbench.statistics.consistency import consistency_table
+from nlbench.statistics.summary import STATISTICS, statistics_table, tables
 from tests.statistics import made_runs
 
 
@@ -111,6 +112,22 @@ def test_a_filter_that_diverges_at_once_gives_nan_and_zero_runs_and_leaves_the_o
             assert row.value == np.inf
         elif key[3] == "diverged":
             assert (row.value, row.n) == (1.0, 300)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("runs", [100, 40 * made_runs.LANES])
+def test_errors_at_the_end_of_what_numbers_hold_make_tables_without_a_warning(runs):
+    layout = made_runs.layout()
+    made = made_runs.make(layout, runs, seed=12, lost=0.0)
+    most = np.finfo(float).max ** (1 / 6)
+    made.error[1] *= 0.999 * most / np.abs(made.error[1]).max()  # each sixth power is a number, their sum is none
+    made.error[2] *= 1e160  # lost, but for the runs that are almost exact
+    totals = made_runs.total(made, layout)
+    consistency_table(totals, tables(totals)["statistics"], 2)
+    rows = made_runs.keyed(tables(totals)["statistics"])
+    plain = np.sqrt(np.mean((made.error[1, 2, 0] / most) ** 2)) * most
+    assert rows["filter 2", "1.0", "position", "rms"].value == pytest.approx(plain, rel=1e-9)
+    assert rows["filter 3", "1.0", "all", "diverged"].value > 0.99
 
 
 def test_one_run_has_values_but_no_standard_errors():

@@ -15,7 +15,7 @@ from nlbench.engine.planning import machine, sizes
 from nlbench.engine.planning.calibration import calibrate, extend
 from nlbench.engine.planning.compilation import listening
 from nlbench.engine.planning.durations import Measured, Work, durations, shares
-from nlbench.engine.planning.memory import memory
+from nlbench.engine.planning.memory import memory, process
 from nlbench.engine.planning.precision import Chosen, needed, pilot_runs
 from nlbench.engine.problem import make
 from nlbench.engine.resume import finished_runs, resumed
@@ -64,7 +64,7 @@ def plan(
     before = machine.resident()
     with listening() as heard:
         compiled, seconds = _timed(lambda: compile_chunks(problem, experiment.monte_carlo.seed))
-    held = machine.resident()
+    after = machine.resident()
     threads = experiment.engine.threads or runtime.threads()
     folder = RunFolder(Path(out) / experiment.experiment / experiment.hash12()) if own is None else None
     saved = resumed(folder, compiled) if folder and folder.path.is_dir() else None
@@ -90,7 +90,7 @@ def plan(
         heard.compilation(seconds),
         calibration,
     )
-    needs = memory(compiled, problem, files["checkpoint"], values, threads, held, held - before)
+    needs = memory(compiled, problem, files["checkpoint"], values, threads, process(before, after))
     return {
         **_counts(experiment, problem, left),
         "threads": threads,

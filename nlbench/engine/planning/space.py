@@ -22,7 +22,7 @@ def require(compiled: Compiled, totals: Totals, runs: int, threads: int, folder:
     layout = totals.layout
     state = sizes.most_state(totals, compiled, runs)
     values = min(runs, layout.keep_runs) * len(layout.filters) * len(layout.reports)
-    more = memory(compiled, compiled.problem, state, values, threads, held=0, grown=0)
+    more = memory(compiled, compiled.problem, state, values, threads, process=0)
     short = [
         f"{what}: needs about {_size(wanted)}, free {_size(free)}"
         for what, wanted, free in (
