@@ -28,6 +28,12 @@ SECONDS_TO_CONNECT = 20.0
 SECONDS_WITHOUT_WORKERS = 120.0
 SECONDS_BETWEEN_LOOKS = 1.0
 MOST_DEATHS = 3  # how often dask may give up a task, each time after it killed several workers
+# For processes started here: what dask does by itself, for displays that nobody looks at, took 5 % of two cores.
+QUIET = {
+    "distributed.admin.tick.interval": "2s",
+    "distributed.admin.system-monitor.interval": "10s",
+    "distributed.worker.profile.enabled": False,
+}
 SAVED = "what was merged is saved, and the same command goes on from there"
 log = logging.getLogger("nlbench")
 
@@ -51,20 +57,22 @@ def dask_workers(address: str, task: remote.Task) -> Iterator[Dask]:
     Raises `ConfigError` for an address that is none, `EnvironmentFault` where no scheduler answers.
     """
     processes = checked(address)
+    import dask
     from distributed import Client, LocalCluster
 
     cluster: Any = None
     try:
         if processes:
-            cluster = LocalCluster(
-                n_workers=processes,
-                threads_per_worker=1,
-                processes=True,
-                dashboard_address=None,
-                worker_dashboard_address=None,
-                preload=[remote.__name__],
-                silence_logs=logging.CRITICAL,
-            )
+            with dask.config.set(QUIET):
+                cluster = LocalCluster(
+                    n_workers=processes,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address=None,
+                    worker_dashboard_address=None,
+                    preload=[remote.__name__],
+                    silence_logs=logging.CRITICAL,
+                )
         client = Client(cluster or address, timeout=SECONDS_TO_CONNECT, set_as_default=False)
     except (OSError, TimeoutError) as error:
         if cluster is not None:

@@ -120,7 +120,9 @@ def test_errors_at_the_end_of_what_numbers_hold_make_tables_without_a_warning(ru
     layout = made_runs.layout()
     made = made_runs.make(layout, runs, seed=12, lost=0.0)
     most = np.finfo(float).max ** (1 / 6)
-    made.error[1] *= 0.999 * most / np.abs(made.error[1]).max()  # each sixth power is a number, their sum is none
+    made.error[1] *= (
+        0.999 * most / np.abs(made.error[1]).max()
+    )  # each sixth power is a number, their sum is none
     made.error[2] *= 1e160  # lost, but for the runs that are almost exact
     totals = made_runs.total(made, layout)
     consistency_table(totals, tables(totals)["statistics"], 2)
