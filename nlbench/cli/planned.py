@@ -21,7 +21,7 @@ TITLES = {
     "process": "program and libraries",
     "calls": "calls at the same time",
     "totals": "totals, kept runs",
-    "finishing": "saving, tables, filters alone",
+    "finishing": "saving, tables",
     "libraries": "tables and figures",
     "checkpoint": "checkpoint",
     "checkpoint_replaced": "its replacement",

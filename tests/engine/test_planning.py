@@ -11,7 +11,7 @@ import pytest
 import nlbench as nb
 from nlbench import engine, report, schedule
 from nlbench.engine.compiled import compile_chunks
-from nlbench.engine.planning import calibration, durations, sizes, space
+from nlbench.engine.planning import calibration, durations, plan, sizes, space
 from nlbench.engine.planning.compilation import LOADING, listening
 from nlbench.engine.planning.memory import memory
 from nlbench.engine.problem import make
@@ -163,6 +163,13 @@ def test_the_size_of_the_totals_is_foretold_from_fewer_runs(compiled):
     actual = sum(array.nbytes for array in many.state().values())
     assert sizes.state(few, 60 * 64) == actual
     assert actual <= sizes.most_state(Totals(compiled.problem.layout), compiled, 60 * 64) < 1.5 * actual
+
+
+def test_tables_are_timed_on_no_more_runs_than_there_will_be(compiled):
+    many = Totals(compiled.problem.layout)
+    many.add(0, compiled.sums(0, 60, 60 * 64))
+    assert plan._at_most(60 * 64, compiled, many, 2) is many
+    assert plan._at_most(100, compiled, many, 2).runs == 128
 
 
 def test_a_billion_runs_need_no_more_memory_than_those_that_are_kept(compiled):

@@ -23,6 +23,7 @@ from nlbench.results import atomic
 from nlbench.results.folder import RunFolder
 from nlbench.statistics.consistency import consistency_table
 from nlbench.statistics.summary import tables
+from nlbench.statistics.totals import Totals
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from nlbench.engine.compiled import Compiled
     from nlbench.engine.problem import Problem
     from nlbench.schedule import Schedule
-    from nlbench.statistics.totals import Totals
     from nlbench.systems.discrete import DiscreteSystem
     from nlbench.systems.system import System
 
@@ -75,8 +75,9 @@ def plan(
     bounds = (
         _timed(lambda: bounds_table(problem, experiment.monte_carlo.seed))[1] if experiment.bounds else 0.0
     )
-    files, tabled = _timed(lambda: _files(experiment, problem, calibration.totals, left.runs))
-    pictures = _pictures(experiment, problem, calibration.totals)
+    totals = _at_most(left.runs, compiled, calibration.totals, threads)
+    files, tabled = _timed(lambda: _files(experiment, problem, totals, left.runs))
+    pictures = _pictures(experiment, problem, totals)
     values = min(left.runs, problem.layout.keep_runs) * len(experiment.labels) * len(problem.layout.reports)
     work = Work(left.blocks, values, files["checkpoint"], pictures, len(experiment.claims), left.finished)
     counted, counting = _timed(lambda: cost.operations(problem))
@@ -118,6 +119,15 @@ def _chosen(
         return needed(precision, saved, block)
     extend(compiled, totals, math.ceil(pilot / block), threads)
     return needed(precision, totals, block)
+
+
+def _at_most(runs: int, compiled: Compiled, totals: Totals, threads: int) -> Totals:
+    """These totals, or those of the run where that is shorter than what was computed to time it."""
+    if totals.runs <= runs:
+        return totals
+    shorter = Totals(compiled.problem.layout)
+    extend(compiled, shorter, math.ceil(runs / compiled.problem.block), threads)
+    return shorter
 
 
 def _left(asked: int, block: int, saved: Totals | None, folder: RunFolder | None) -> Left:
