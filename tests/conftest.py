@@ -11,10 +11,9 @@ from jaxtyping import install_import_hook
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("PJRT_NPROC", "1")
 
-# Before anything of nlbench is imported: the hook decorates every function of these packages.
-NUMERICAL = (
-    "algebra continuous discrete engine filters moments references simulate statistics systems updates"
-)
+# Before anything of nlbench is imported: the hook decorates every function of these packages; not of `algebra`,
+# which is called thousands of times for each program that is traced, so that tests took a fifth longer.
+NUMERICAL = "continuous discrete engine filters moments references simulate statistics systems updates"
 install_import_hook([f"nlbench.{package}" for package in NUMERICAL.split()], "beartype.beartype")
 
 import jax  # noqa: E402 - the hook comes first

@@ -11,12 +11,10 @@ from pathlib import Path
 
 from docs.generator import api, commands, experiment, filters, systems
 from nlbench import systems as registry
-from nlbench.config.editor import json_schema
 from nlbench.filters import catalogue
 
 ROOT = Path(__file__).parents[2]
 WRITTEN = ROOT / "docs"
-SCHEMA = WRITTEN / "schema" / "experiment.json"
 LINK = re.compile(r"(?<!`)\]\(([^)#\s:]+)(#[^)\s]*)?\)")
 SKIPPED = {"generator", "__pycache__"}
 # Pages that stand elsewhere in the repository.
@@ -74,11 +72,6 @@ def generated(pages: Path) -> dict[str, str]:
         "commands.md": continued("commands.md", commands.page),
         "api.md": continued("api.md", api.page),
     }
-
-
-def schema_text() -> str:
-    """The published JSON Schema, as it is in the repository."""
-    return json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"
 
 
 def navigation(pages: Path) -> list[dict[str, list]]:

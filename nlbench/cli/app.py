@@ -20,6 +20,7 @@ from nlbench.cli import (
     reproduce,
     run,
     saved,
+    schema,
     verify,
 )
 from nlbench.errors import EnvironmentFault, Interrupted, NlbenchError
@@ -130,4 +131,5 @@ app.command("compare")(compare.compare)
 app.command("filter")(filter.filter_recorded)
 app.command("perf")(perf.perf)
 app.command("new")(new.new)
+app.command("schema")(schema.schema)
 app.command("doctor")(preview.doctor)

@@ -80,10 +80,16 @@ def make(experiment: Experiment, own: System | DiscreteSystem | None = None) -> 
         makers.append(partial(_reference, experiment.reference, experiment.labels[-1], truth, times))
     runners = _all(makers)
     if experiment.engine.precision == "float32":
-        single_precision.check(runners)
+        single_precision.check(runners, () if own else _units(experiment.system.name))
     layout, block = _layout(experiment, stated), experiment.engine.block
     check_claims(experiment.claims, layout)
     return Problem(truth, runners, times, layout, block, stated, _nominal_steps(truth, times))
+
+
+def _units(system: str) -> tuple[str, ...]:
+    """The parameters by which a system's units are chosen."""
+    names = systems.parameters(system).model_fields
+    return tuple(f"system.{name}" for name in names if name.endswith("_unit"))
 
 
 def _all(makers: list[Callable[[], Runner]]) -> tuple[Runner, ...]:

@@ -25,10 +25,11 @@ APART = 0.01  # of the largest entry
 ORDERS = ("values", "first derivatives", "second derivatives")  # of which filters make use
 
 
-def check(runners: tuple[Runner, ...]) -> None:
+def check(runners: tuple[Runner, ...], units: tuple[str, ...] = ()) -> None:
     """Compare with float64 at the initial mean of each filter and one standard deviation from it along every state.
 
-    Raises `ConfigError` with a line for each function whose values or derivatives differ by more than 1 %.
+    units: the parameters by which the system's units can be chosen. Raises `ConfigError` with a line for each function
+    whose values or derivatives differ by more than 1 %, and what to do.
     """
     found = [
         f"{name}: {ORDERS[order]} in float32 are {_off(apart)}, since numbers leave its range or cancel"
@@ -36,9 +37,8 @@ def check(runners: tuple[Runner, ...]) -> None:
         for name, order, apart in _differences(runner)
     ]
     if found:
-        advice = (
-            "state the system in units in which its numbers are nearer to one, or take precision: float64"
-        )
+        where = f" (by {' and '.join(units)})" if units else ""
+        advice = f"state the system in units in which its numbers are nearer to one{where}, or take precision: float64"
         raise ConfigError([Problem(each, "engine.precision") for each in [*dict.fromkeys(found), advice]])
 
 

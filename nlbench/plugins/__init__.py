@@ -98,6 +98,8 @@ def restore(wanted: Sequence[Any]) -> None:
     for spec in wanted:
         if spec.digest in _allowed or installed.has(spec.digest):
             continue
+        if not spec.source and any(Path(each.path).name == spec.file for each in _allowed.values()):
+            raise ConfigError(f"this was made with other code of {spec.file} than is at hand")
         if not spec.source:
             raise ConfigError(
                 f"this experiment needs the plug-in {spec.file}: allow it with --plugin {spec.file}"

@@ -148,7 +148,9 @@ def test_every_ekf_row_follows_the_same_filter():
     np.testing.assert_allclose(means, expected, rtol=0, atol=1e-5)
 
 
-@every_system
+@pytest.mark.parametrize(
+    "name", [pytest.param(each, marks=pytest.mark.long if each == "orbit" else ()) for each in SMALL]
+)
 def test_nlbench_third_order_rows_equal_the_oracle(name):
     y = workloads.measurements(SMALL[name])
     row = ours.third_order(SMALL[name], turned(name, y))

@@ -56,6 +56,7 @@ def python(*arguments: str) -> subprocess.CompletedProcess[str]:
         (["list", "systems"], 0),
         (["list", "filters"], 0),
         (["list", "filters", "third-order"], 0),
+        (["schema"], 0),
     ],
 )
 def test_nothing_heavy_is_loaded(tmp_path, monkeypatch, arguments, code):

@@ -140,6 +140,7 @@ def test_a_filter_of_two_kinds_takes_the_options_of_the_one_that_it_is(tmp_path)
     assert (errors(found, "rk4") != errors(found, "euler")).all()
 
 
+@pytest.mark.long
 def test_filters_may_assume_what_is_not_true(tmp_path):
     """By the system's parameters, or by the entry's model."""
     assumed = {"name": "schwartz", "measurement_psd": 0.1, "assumed_measurement_psd": 0.4}

@@ -63,6 +63,7 @@ def python(folder: Path, *arguments: str) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 def test_the_added_filter_is_listed_and_runs_in_an_experiment(copy):
     assert NAME in python(copy, "-m", "nlbench", "list", "filters")
     assert 0 < float(python(copy, "-c", RUN)) < 100

@@ -3,23 +3,53 @@
 from __future__ import annotations
 
 import copy
+import json
 from pathlib import Path
 
 import pytest
 from ruamel.yaml import YAML
+from typer.testing import CliRunner
 
-from docs.generator import site
 from nlbench import config, systems
+from nlbench.cli.app import app
 from nlbench.config.editor import json_schema
 from nlbench.config.schema import Experiment
 from nlbench.errors import ConfigError
 from nlbench.filters import catalogue
 
-CONFIGS = sorted((Path(__file__).parents[2] / "configs").rglob("*.yaml"))
+ROOT = Path(__file__).parents[2]
+CONFIGS = sorted((ROOT / "configs").rglob("*.yaml"))
+PUBLISHED = ROOT / "docs" / "schema" / "experiment.json"
+TANK = """
+import numpy as np
+import nlbench as nb
+
+def tank(leak: float = 0.1) -> nb.System:
+    return nb.System(
+        drift=lambda t, x: -leak * x, observe=lambda t, x: x, measurement_cov=np.eye(1),
+        initial=nb.Moments(mean=np.ones(1), cov=np.eye(1)), interval=1.0,
+    )
+
+SYSTEMS = {"tank": tank}
+"""
 
 
-def test_the_published_file_is_that_of_the_models():
-    assert site.SCHEMA.read_text() == site.schema_text(), "renew it: python -m docs.generator --schema"
+def printed(*arguments: str) -> str:
+    return CliRunner().invoke(app, ["schema", *arguments]).stdout
+
+
+def test_the_published_file_is_what_is_printed():
+    assert PUBLISHED.read_text() == printed(), f"renew it: nlbench schema > {PUBLISHED}"
+
+
+def test_with_a_plug_in_it_takes_its_names_and_parameters(tmp_path):
+    file = tmp_path / "tank.py"
+    file.write_text(TANK)
+    data = {"experiment": "small", "system": {"name": "tank", "leak": 0.2}, "filters": ["ekf"]}
+    with_plugin, without = (checker(json.loads(printed(*words))) for words in (["--plugin", str(file)], []))
+    assert with_plugin.is_valid(data)
+    assert not with_plugin.is_valid(data | {"system": {"name": "tank", "leek": 0.2}})
+    assert not without.is_valid(data)
 
 
 def test_it_knows_every_key_system_and_filter():
@@ -32,8 +62,11 @@ def test_it_knows_every_key_system_and_filter():
 
 @pytest.fixture(scope="module")
 def validator():
+    return checker(json_schema())
+
+
+def checker(schema):
     validators = pytest.importorskip("jsonschema").validators
-    schema = json_schema()
     kind = validators.validator_for(schema)
     kind.check_schema(schema)
     return kind(schema)

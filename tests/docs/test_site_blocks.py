@@ -110,7 +110,7 @@ def parsed(line: str) -> None:
 
     from nlbench.cli.app import app
 
-    _, name, *words = shlex.split(line, comments=True)
+    _, name, *words = shlex.split(line.partition(" > ")[0], comments=True)
     command = get_command(app).commands[name]
     assert "--plugin" not in words or "--plugin" in [
         option for each in command.params for option in each.opts

@@ -44,6 +44,7 @@ def test_chunk_and_threads_do_not_change_one_byte(plain, tmp_path, engine):
     assert table_bytes(other.path) == table_bytes(plain.path)
 
 
+@pytest.mark.long
 def test_two_devices_do_not_change_one_byte(tmp_path):
     for devices in (1, 2):
         flags = f"--xla_force_host_platform_device_count={devices}"
@@ -75,7 +76,7 @@ def test_block_and_precision_make_another_experiment():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kills", [3, pytest.param(60, marks=pytest.mark.long)])
+@pytest.mark.parametrize("kills", [2, pytest.param(60, marks=pytest.mark.long)])
 def test_killed_at_any_moment_and_resumed_gives_the_same_bytes(tmp_path, kills):
     """Killed up to so many times, at the first checkpoint after each start or up to 0.09 s later."""
     program = RUN.replace("import sys\n", "import sys\nimport nlbench.engine.resume as resume\n", 1)

@@ -212,7 +212,7 @@ def test_noise_that_multiplies_the_state_reaches_truth_and_filters(tmp_path):
     )
 
 
-@pytest.mark.parametrize("name", ["ensemble", "bootstrap"])
+@pytest.mark.parametrize("name", [pytest.param("ensemble", marks=pytest.mark.long), "bootstrap"])
 def test_a_filter_of_samples_draws_its_own_in_every_trajectory(name, tmp_path):
     """Against the Kalman filter on the same data: with common draws the differences would be nearly equal."""
     results = run(scalar(), tmp_path, filters=[{"name": name, "particles": 50}, "kalman"])

@@ -77,6 +77,7 @@ def test_scores_are_those_of_a_plain_loop():
     assert some_left_out == {"third-order-guarded", "limited"}
 
 
+@pytest.mark.long
 def test_asking_for_scores_changes_no_estimate():
     problem = make(experiment(**OSCILLATOR))
     without = problem._replace(layout=problem.layout._replace(scores=False))

@@ -105,4 +105,5 @@ def test_a_run_in_float32_is_refused_and_writes_nothing(tmp_path):
     )
     assert done.returncode == 2, done.stderr
     assert "drift: first derivatives in float32" in done.stderr
+    assert "nearer to one (by system.length_unit and system.time_unit), or" in done.stderr
     assert not (tmp_path / "out").exists()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 import subprocess
 from pathlib import Path
@@ -261,6 +262,19 @@ def test_results_are_read_without_the_plugin_and_not_run_without_it():
     Path("walk.py").write_text(SYSTEM + "\n")
     said = problems("validate", "recorded.yaml", "--plugin", "walk.py", "--plugin", "mine.py")
     assert "made with other code of walk.py" in said
+
+
+def test_a_run_is_verified_with_its_plugin_and_not_without_or_with_another():
+    nb.allow("walk.py")
+    folder = str(nb.run("own.yaml").path)
+    plugins.forget()
+    found = json.loads(command("verify", folder, "--plugin", "walk.py", "--json").stdout)
+    assert (found["exit_code"], found["same"], found["block"]) == (0, True, 0)
+    Path("executed").unlink()
+    assert "allow it with --plugin walk.py" in problems("verify", folder)
+    assert not Path("executed").exists()
+    Path("walk.py").write_text(SYSTEM + "\n")
+    assert "made with other code of walk.py" in problems("verify", folder, "--plugin", "walk.py")
 
 
 @pytest.mark.long

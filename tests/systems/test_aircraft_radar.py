@@ -113,7 +113,14 @@ def test_the_azimuth_behind_the_radar_is_wrapped():
     )
 
 
-@pytest.mark.parametrize("name", ["ekf", pytest.param("sof-gaussian", marks=pytest.mark.long), "ukf"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("ekf", marks=pytest.mark.long),
+        pytest.param("sof-gaussian", marks=pytest.mark.long),
+        "ukf",
+    ],
+)
 def test_filters_track_it(name):
     """Some kilometres at this range and these angles, never lost in 20 scans."""
     system = build()

@@ -117,6 +117,7 @@ def test_fixed_errors_go_through_the_sixteen_patterns_of_signs():
         build(initial_error={"sigma": 1, "pattern": "+-"})
 
 
+@pytest.mark.long
 def test_patterns_are_spread_evenly_over_the_runs(tmp_path):
     results = run(tmp_path, system={"name": "lunar-orbit", "initial_error": {"sigma": 1}, "sightings": False})
     kept = results.table("runs")

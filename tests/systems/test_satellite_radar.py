@@ -132,7 +132,14 @@ def test_azimuths_are_wrapped():
 
 
 @pytest.mark.parametrize("radars", [1, pytest.param(2, marks=pytest.mark.long)])
-@pytest.mark.parametrize("name", ["ekf", pytest.param("sof-gaussian", marks=pytest.mark.long), "ukf"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("ekf", marks=pytest.mark.long),
+        pytest.param("sof-gaussian", marks=pytest.mark.long),
+        "ukf",
+    ],
+)
 def test_filters_track_it(name, radars):
     system = build(radars=radars)
     states, seen = simulated(system, 20, 16, seed=1)

@@ -101,7 +101,7 @@ def test_only_bearings_are_wrapped():
 
 
 @BOTH
-@pytest.mark.parametrize("name", ["ekf", "sof-gaussian", "ukf"])
+@pytest.mark.parametrize("name", [pytest.param("ekf", marks=pytest.mark.long), "sof-gaussian", "ukf"])
 def test_filters_track_it(name, measurement):
     system = build(measurement=measurement)
     states, seen = simulated(system, 20, 16, seed=1)

@@ -72,9 +72,6 @@ def plan(
     chosen = _chosen(precision, compiled, saved, calibration.totals, threads) if precision else None
     asked = chosen.runs if chosen else experiment.monte_carlo.runs
     left = _left(asked, problem.block, saved, folder)
-    bounds = (
-        _timed(lambda: bounds_table(problem, experiment.monte_carlo.seed))[1] if experiment.bounds else 0.0
-    )
     totals = _at_most(left.runs, compiled, calibration.totals, threads)
     files, tabled = _timed(lambda: _files(experiment, problem, totals, left.runs))
     pictures = _pictures(experiment, problem, totals)
@@ -82,14 +79,14 @@ def plan(
     work = Work(left.blocks, values, files["checkpoint"], pictures, len(experiment.claims), left.finished)
     counted, counting = _timed(lambda: cost.operations(problem))
     measured = Measured(
-        stated,
-        bounds,
-        tabled,
-        counting,
-        shares(problem, counted),
-        machine.slowness(),
-        heard.compilation(seconds),
-        calibration,
+        problem=stated,
+        bounds=_bounds(experiment, problem),
+        tables=tabled,
+        counting=counting,
+        shares=shares(problem, counted),
+        slowness=machine.slowness(),
+        compilation=heard.compilation(seconds),
+        calibration=calibration,
     )
     needs = memory(compiled, problem, files["checkpoint"], values, threads, process(before, after))
     return {
@@ -108,6 +105,13 @@ def _timed(made: Callable[[], T]) -> tuple[T, float]:
     begun = time.perf_counter()
     result = made()
     return result, time.perf_counter() - begun
+
+
+def _bounds(experiment: Experiment, problem: Problem) -> float:
+    """Seconds of the table of bounds, if it is asked for."""
+    if not experiment.bounds:
+        return 0.0
+    return _timed(lambda: bounds_table(problem, experiment.monte_carlo.seed))[1]
 
 
 def _chosen(
