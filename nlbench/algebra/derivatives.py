@@ -23,12 +23,16 @@ class Taylor(NamedTuple):
 
 
 def expand(
-    function: Callable, t: Scalar, x: Sequence[Scalar], order: int, symmetry: Groups | None = None
+    function: Callable,
+    t: Scalar | Sequence[Scalar],
+    x: Sequence[Scalar],
+    order: int,
+    symmetry: Groups | None = None,
 ) -> Taylor:
     """Taylor coefficients of `function` at (t, x) up to `order` (0, 1 or 2).
 
     function: (t, x) -> array, or a tuple of scalars; x an array of shape (n,).
-    x: the n components of the point.
+    t: the time, or a vector of whatever else the function depends on. x: the n components of the point.
     symmetry: index symmetry of what the function returns.
     Derivatives are those of jax.jacfwd and jax.hessian, taken direction by direction. Components that depend on
     neither t nor x are Python floats, and zeros are missing.

@@ -67,7 +67,7 @@ def spectrum(system: System, t: Any, x: Any) -> Any:
 
 def enters_linearly(function: Callable, n: int, s: int) -> bool:
     """Whether the second derivatives in w of function(t, x, w) are zero by structure, for x (n,) and w (s,)."""
-    return all(min(index[1:]) < n for index in curvatures(function, n, s))
+    return not curvatures(lambda given, w: function(given[0], given[1:], w), 1 + n, s)
 
 
 def bends(system: System | DiscreteSystem, options: Any) -> str | None:
@@ -86,21 +86,24 @@ def bends(system: System | DiscreteSystem, options: Any) -> str | None:
             diffusion = system.diffusion
             s = jax.eval_shape(diffusion, 0.0, jnp.zeros(n)).shape[1]
             functions["diffusion"] = (lambda t, x, w: jnp.asarray(diffusion(t, x)) @ w, s)
-    return next((name for name, (f, s) in functions.items() if curvatures(f, n, s)), None)
+
+    def bent(f: Callable, s: int) -> bool:
+        return bool(curvatures(lambda given, z: f(given[0], z[:n], z[n:]), 1, n + s))
+
+    return next((name for name, (f, s) in functions.items() if bent(f, s)), None)
 
 
-def curvatures(function: Callable, n: int, s: int) -> list[tuple[int, ...]]:
-    """Indices (i, a, b) of the second derivatives of function(t, x, w) in (x, w) that are not zero by structure."""
+def curvatures(function: Callable, p: int, n: int) -> list[tuple[int, ...]]:
+    """Indices (i, a, b) of the second derivatives of function(given, z) in z that are not zero by structure, for given
+    (p,) and z (n,), none of which is known, so that no zero of one time passes for all."""
     found: list[tuple[int, ...]] = []
 
-    def second(
-        t: Any, z: Any
-    ) -> None:  # at a time that is not known, so that no zero of one time passes for all
-        taylor = expand(lambda t, z: function(t, z[:n], z[n:]), t, [z[i] for i in range(n + s)], 2)
+    def second(given: Any, z: Any) -> None:
+        taylor = expand(function, list(given), list(z), 2)
         assert taylor.second is not None
         found.extend(taylor.second.entries)
 
-    jax.eval_shape(second, jnp.zeros(()), jnp.zeros(n + s))
+    jax.eval_shape(second, jnp.zeros(p), jnp.zeros(n))
     return found
 
 

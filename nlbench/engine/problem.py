@@ -73,14 +73,15 @@ def make(experiment: Experiment, own: System | DiscreteSystem | None = None) -> 
     truth = stated.truth or stated
     filters.check(truth)
     times = _schedule(experiment, truth)
+    models = _models(experiment, own)
     makers: list[Callable[[], Runner]] = [
-        partial(_fitting, experiment, spec, own, truth, times) for spec in experiment.filters
+        partial(_fitting, experiment, spec, models, truth, times) for spec in experiment.filters
     ]
     if experiment.reference is not None:
         makers.append(partial(_reference, experiment.reference, experiment.labels[-1], truth, times))
     runners = _all(makers)
     if experiment.engine.precision == "float32":
-        single_precision.check(runners, () if own else _units(experiment.system.name))
+        single_precision.check(runners, times, () if own else _units(experiment.system.name))
     layout, block = _layout(experiment, stated), experiment.engine.block
     check_claims(experiment.claims, layout)
     return Problem(truth, runners, times, layout, block, stated, _nominal_steps(truth, times))
@@ -155,15 +156,33 @@ def _sampled(truth: System | DiscreteSystem, times: Schedule) -> System | Discre
     return replace(truth, measurement="discrete", measurement_cov=variance)
 
 
+def _models(
+    experiment: Experiment, own: System | DiscreteSystem | None
+) -> Callable[[FilterSpec], System | DiscreteSystem]:
+    """What gives the model of a filter: filters with the same parameters share one."""
+    built: dict[str, System | DiscreteSystem] = {}
+
+    def model(spec: FilterSpec) -> System | DiscreteSystem:
+        if own is not None:
+            return own
+        parameters = {**experiment.system.parameters, **spec.model}
+        key = repr(sorted(parameters.items()))
+        if key not in built:
+            built[key] = systems.build(experiment.system.name, **parameters)
+        return built[key]
+
+    return model
+
+
 def _fitting(
     experiment: Experiment,
     spec: FilterSpec,
-    own: System | DiscreteSystem | None,
+    models: Callable[[FilterSpec], System | DiscreteSystem],
     truth: System | DiscreteSystem,
     times: Schedule,
 ) -> Runner:
     """A filter whose model fits the data. Raises `ConfigError` for another."""
-    model = own or systems.build(experiment.system.name, **{**experiment.system.parameters, **spec.model})
+    model = models(spec)
     expected, found = _described(truth), _described(model)
     if found != expected:
         raise ConfigError(f"{spec.label}: its model has {found}, the data {expected}")

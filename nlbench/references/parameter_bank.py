@@ -112,11 +112,11 @@ def _observed(system: DiscreteSystem, k: Any, x: Any, v: Any) -> Any:
 def _refuse(system: DiscreteSystem) -> None:
     """Raises `ConfigError` where the bank would not be exact."""
     n, s, q = system.states - 1, system.noises, len(system.measurement_cov)
-    given = {  # the constant is an argument that nothing is differentiated by
-        "transition": (lambda z, x, w: _next(system, z, jnp.append(x, z), w)[:n], s),
-        "observe": (lambda z, x, v: _observed(system, z, jnp.append(x, z), v), q),
+    functions = {  # of what nothing is differentiated by, the time and the constant, and of the states and noises
+        "transition": (lambda given, z: _next(system, given[0], jnp.append(z[:n], given[1]), z[n:])[:n], s),
+        "observe": (lambda given, z: _observed(system, given[0], jnp.append(z[:n], given[1]), z[n:]), q),
     }
-    bent = [name for name, (function, noises) in given.items() if curvatures(function, n, noises)]
+    bent = [name for name, (function, noises) in functions.items() if curvatures(function, 2, n + noises)]
     if bent:
         raise ConfigError(f"exact: {bent[0]} is not linear once the last state is known")
     x, w = jnp.asarray(system.initial.mean, float), jnp.zeros(s)

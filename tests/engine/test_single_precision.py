@@ -1,4 +1,4 @@
-"""Claim: where derivatives do not survive float32, that is said before anything is computed."""
+"""Claim: where values or derivatives do not survive float32, now or later in a run, that is said before any is made."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import nlbench as nb
+from nlbench import schedule
 from nlbench.engine import single_precision
 from nlbench.engine.problem import Runner
 from nlbench.errors import ConfigError
@@ -36,10 +37,13 @@ def orbit(length, time):
     )
 
 
-def checked(system, *names):
-    """What is said of the filters of a system; its steps do not matter."""
+def checked(system, *names, intervals=4, step=None):
+    """What is said of the filters of a system in a run of some intervals."""
     filters = [nb.filters.build(name, system) for name in names or ("ekf",)]
-    single_precision.check(tuple(Runner(f.name, f, system.initial, 1.0, 1) for f in filters))
+    times = schedule.make(
+        intervals * system.interval, step or system.interval, system.interval, system.interval
+    )
+    single_precision.check(tuple(Runner(f.name, f, system.initial, 1.0, 1) for f in filters), times)
 
 
 def test_derivatives_that_leave_the_range_are_named_once():
@@ -92,6 +96,46 @@ def test_in_discrete_time_too():
     )
     with pytest.raises(ConfigError, match="transition: values in float32"):
         checked(far)
+
+
+def growing(observe, cov=0.01, rate=1.0):
+    """A state that grows e-fold in a time of 1 / rate, measured every second."""
+    return nb.System(
+        drift=lambda t, x: rate * x,
+        observe=observe,
+        measurement_cov=np.eye(1),
+        initial=nb.Moments(np.array([1.0]), np.array([[cov]])),
+        interval=1.0,
+    )
+
+
+def test_what_leaves_the_range_later_is_found():
+    """(e^10 1e35)^2 is beyond 3e38, 1e35 is not."""
+    system = growing(lambda t, x: 1e35 * x)
+    checked(system, intervals=5, step=0.01)
+    with pytest.raises(ConfigError, match="observe: values in float32 are lost"):
+        checked(system, intervals=10, step=0.01)
+
+
+def test_a_function_of_time_that_loses_its_digits_is_found():
+    """At time zero it is zero; float32 knows 1e9 t to 64, 10 t to its millionth part."""
+    checked(growing(lambda t, x: jnp.sin(10 * t) * x, rate=-1.3), step=0.1)
+    with pytest.raises(ConfigError, match="observe: values in float32 are off by"):
+        checked(growing(lambda t, x: jnp.sin(1234567891.0 * t) * x, rate=-1.3), step=0.1)
+
+
+def test_a_derivative_in_a_state_that_is_known_at_first_and_moved_by_noise_is_looked_at():
+    """Half, and its derivative in the second state, which takes 1e-50 to form."""
+    system = nb.System(
+        drift=lambda t, x: jnp.stack([-x[0], -x[1]]),
+        observe=lambda t, x: 1e25 * (x[:1] / (1e25 * (2 + x[1:]))),
+        measurement_cov=np.eye(1),
+        initial=nb.Moments(np.array([1.0, 0.0]), np.diag([0.01, 0.0])),
+        diffusion=lambda t, x: jnp.array([[0.0], [0.1]]),
+        interval=1.0,
+    )
+    with pytest.raises(ConfigError, match="observe: first derivatives in float32 are off by"):
+        checked(system, step=0.1)
 
 
 def test_a_run_in_float32_is_refused_and_writes_nothing(tmp_path):
