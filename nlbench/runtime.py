@@ -29,10 +29,13 @@ def configure(precision: str = "float64", threads: int | None = None) -> None:
     """Set jax's precision and XLA's options; call it before the first computation.
 
     precision: "float64" or "float32". threads: of the engine; None means one for each core available.
-    A second call with the same precision does nothing. Raises `ConfigError` for another precision than chosen before.
+    A second call with the same precision does nothing. Raises `ConfigError` for another precision than chosen before,
+    `EnvironmentFault` elsewhere than on Linux, whose locks, signals and accounts of memory runs rely on.
     """
-    from nlbench.errors import ConfigError
+    from nlbench.errors import ConfigError, EnvironmentFault
 
+    if sys.platform != "linux":
+        raise EnvironmentFault(f"nlbench computes on Linux, or in a container or WSL; this is {sys.platform}")
     if precision not in ("float64", "float32"):
         raise ConfigError(f"precision '{precision}' is neither float64 nor float32")
     if _chosen.get("precision", precision) != precision:

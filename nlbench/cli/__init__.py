@@ -6,11 +6,14 @@ __all__ = ["main"]
 
 
 def main() -> None:
-    """The command `nlbench`; Ctrl-C at any moment ends it with exit code 130."""
-    try:
-        from nlbench.cli.app import app
+    """The command `nlbench`; Ctrl-C or SIGTERM at any moment ends it with exit code 130."""
+    from nlbench.cli.signals import INTERRUPTED, heeded
 
-        app(prog_name="nlbench")
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        sys.exit(130)
+    with heeded():
+        try:
+            from nlbench.cli.app import app
+
+            app(prog_name="nlbench")
+        except KeyboardInterrupt:
+            print(INTERRUPTED, file=sys.stderr)
+            sys.exit(130)

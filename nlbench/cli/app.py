@@ -23,6 +23,7 @@ from nlbench.cli import (
     schema,
     verify,
 )
+from nlbench.cli.signals import INTERRUPTED
 from nlbench.errors import EnvironmentFault, Interrupted, NlbenchError
 
 HELP = """Monte Carlo benchmarks of nonlinear filters.
@@ -51,25 +52,28 @@ class Commands(TyperGroup):
     def invoke(self, context: Any) -> Any:
         try:
             return super().invoke(context)
-        except NlbenchError as error:
-            output.complain(str(error))
-            raise typer.Exit(error.exit_code) from None
-        except KeyboardInterrupt:
-            output.complain("interrupted; the same command goes on from what was saved")
-            raise typer.Exit(Interrupted.exit_code) from None
         except (typer.Exit, typer.Abort, BrokenPipeError):
             raise
-        except MemoryError:
-            output.complain("out of memory; `nlbench plan CONFIG` says what an experiment needs")
-            raise typer.Exit(EnvironmentFault.exit_code) from None
-        except Exception as error:
-            if type(error).__module__.startswith(("typer", "click")) or os.environ.get("NLBENCH_DEBUG"):
-                raise
-            output.complain(internal(error))
-            raise typer.Exit(NlbenchError.exit_code) from None
+        except (Exception, KeyboardInterrupt) as error:
+            raise typer.Exit(_ended(error)) from None
 
 
-def internal(error: Exception) -> str:
+def _ended(error: BaseException) -> int:
+    """The exit code of an error, after saying it in plain words."""
+    if isinstance(error, KeyboardInterrupt):
+        error = Interrupted(INTERRUPTED)
+    if isinstance(error, MemoryError):
+        error = EnvironmentFault("out of memory; `nlbench plan CONFIG` says what an experiment needs")
+    if isinstance(error, NlbenchError):
+        output.complain(str(error))
+        return error.exit_code
+    if type(error).__module__.startswith(("typer", "click")) or os.environ.get("NLBENCH_DEBUG"):
+        raise error
+    output.complain(internal(error))
+    return NlbenchError.exit_code
+
+
+def internal(error: BaseException) -> str:
     """One line on an error that is not the user's, after its traceback was put aside."""
     import tempfile
     import traceback

@@ -130,14 +130,14 @@ def computing(
     experiment: Experiment, quiet: bool, compute: Callable[[Any], Any], longest: float | None = None
 ) -> Any:
     """What `compute` gives, called with a function that shows progress and keeps to the budget, with jax set up for
-    the experiment; SIGTERM does what Ctrl-C does."""
+    the experiment; a second signal ends the process."""
     from nlbench import runtime
 
     runtime.configure(precision=experiment.engine.precision, threads=experiment.engine.threads)
     from nlbench.cli.progress import progress
-    from nlbench.cli.signals import ended_by_a_second, terminated_like_interrupted
+    from nlbench.cli.signals import ended_by_a_second
 
-    with terminated_like_interrupted(), ended_by_a_second(), progress(quiet) as show:
+    with ended_by_a_second(), progress(quiet) as show:
         return compute(show if longest is None else budget.Guard(longest, show))
 
 

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from nlbench import engine, errors
 from nlbench.cli.app import app
+from nlbench.cli.signals import heeded
 from tests.example import VALID, spoiled, written
 
 
@@ -115,7 +116,8 @@ def test_sigterm_stops_a_run_like_ctrl_c(tmp_path, monkeypatch, interrupts):
     monkeypatch.setattr(engine, "run", killed)
     terminates, earlier = signal.getsignal(signal.SIGTERM), signal.signal(signal.SIGINT, interrupts)
     try:
-        done = CliRunner().invoke(app, ["run", str(written(tmp_path, VALID))])
+        with heeded():  # as `main` does
+            done = CliRunner().invoke(app, ["run", str(written(tmp_path, VALID))])
     finally:
         signal.signal(signal.SIGINT, earlier)
     assert done.exit_code == 130

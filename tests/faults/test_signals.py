@@ -1,4 +1,5 @@
-"""Claim: a second Ctrl-C or SIGTERM ends a run at once, even in the middle of what Python cannot interrupt."""
+"""Claims: a second Ctrl-C or SIGTERM ends a run at once, even in the middle of what Python cannot interrupt; one that
+comes while jax is imported ends the command as any other does."""
 
 from __future__ import annotations
 
@@ -11,12 +12,14 @@ from pathlib import Path
 
 import pytest
 
+from tests.small_runs import python
+
 # One long call that releases the lock of the interpreter, as a compilation is.
 BUSY = """
 import hashlib
-from nlbench.cli.signals import ended_by_a_second, terminated_like_interrupted
+from nlbench.cli.signals import ended_by_a_second, heeded
 from nlbench.engine.interruption import stop_requests
-with stop_requests(), terminated_like_interrupted(), ended_by_a_second():
+with heeded(), ended_by_a_second(), stop_requests():
     print("busy", flush=True)
     hashlib.pbkdf2_hmac("sha256", b"a", b"b", 100_000_000)
 """
@@ -53,3 +56,31 @@ def test_one_signal_does_not():
         printed, said = process.communicate(timeout=60)
     assert (process.returncode, printed) == (0, "done\n")
     assert "stopping once the blocks in flight are saved" in said
+
+
+# An extension module crashes, or makes an ImportError of what is raised while it is imported.
+IMPORTING = """
+import os, signal, sys, time
+
+class Extension:
+    def find_spec(self, name, path=None, target=None):
+        if name == "jax":
+            try:
+                os.kill(os.getpid(), signal.SIGNAL)
+                time.sleep(5)
+            except KeyboardInterrupt:
+                raise ImportError("Encountered an error while initializing the extension.")
+
+sys.meta_path.insert(0, Extension())
+from nlbench.cli import main
+main()
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_during_an_import_ends_the_command_as_any_other(name, tmp_path):
+    file = Path(__file__).parents[2] / "configs" / "quickstart.yaml"
+    done = python(IMPORTING.replace("SIGNAL", name), "run", str(file), "--out", str(tmp_path))
+    assert (done.returncode, done.stdout) == (130, ""), done.stderr
+    assert done.stderr == "interrupted; the same command goes on from what was saved\n"
+    assert not list(tmp_path.iterdir())

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+
 import jax
 import numpy as np
 import pytest
 
 import nlbench as nb
 from nlbench import runtime
-from nlbench.errors import ConfigError
+from nlbench.errors import ConfigError, EnvironmentFault
 from tests.small_runs import python
 
 
@@ -131,3 +133,9 @@ def test_blocks_are_larger_where_jax_will_compute_on_a_gpu(
 def test_blocks_are_of_64_where_cores_compute():
     jax.devices()
     assert runtime.block() == 64
+
+
+def test_elsewhere_than_on_linux_that_is_said_at_once(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "darwin")
+    with pytest.raises(EnvironmentFault, match=r"computes on Linux, .*; this is darwin"):
+        runtime.configure()
