@@ -68,7 +68,8 @@ def dask_workers(address: str, task: remote.Task) -> Iterator[Dask]:
                     n_workers=processes,
                     threads_per_worker=1,
                     processes=True,
-                    dashboard_address=None,
+                    dashboard_address="127.0.0.1:0",  # any port, so that a second cluster finds one without a warning
+                    scheduler_kwargs={"dashboard": False},
                     worker_dashboard_address=None,
                     preload=[remote.__name__],
                     silence_logs=logging.CRITICAL,

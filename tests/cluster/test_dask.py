@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+import warnings
 from concurrent.futures import CancelledError
 from types import SimpleNamespace
 
@@ -13,6 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 import nlbench as nb
+from nlbench import runtime
 from nlbench.cli.app import app
 from nlbench.engine import cluster, remote
 from nlbench.engine.compiled import compile_chunks
@@ -58,6 +60,12 @@ class Scheduler:
 
     def cancel(self, futures, force):
         pass
+
+
+@pytest.fixture(autouse=True)
+def options():
+    """Those of XLA with which workers start, before jax does."""
+    runtime.configure()
 
 
 @pytest.fixture
@@ -211,3 +219,13 @@ def test_a_scheduler_that_does_not_answer_is_said(tmp_path, monkeypatch):
     with pytest.raises(EnvironmentFault, match="no dask scheduler answers"):
         nb.run(small(), tmp_path, dask="tcp://127.0.0.1:9")
     assert time.monotonic() - begun < 120
+
+
+@pytest.mark.long
+def test_a_second_cluster_starts_without_a_warning(task):
+    pytest.importorskip("distributed")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        with cluster.dask_workers("local:1", task) as one, cluster.dask_workers("local:1", task) as other:
+            assert (one.at_once, other.at_once) == (1, 1)
+    assert not [each for each in said if "Port" in str(each.message)]
