@@ -57,6 +57,7 @@ class NlbenchError(Exception):
     """Base of what the command line reports in plain words, without a traceback."""
 
     exit_code = 1
+    told = False  # whether a JSON document that is printed has said it
 
 
 class ConfigError(NlbenchError):

@@ -1,5 +1,6 @@
 """The command line: each command parses, calls one function of the package and prints."""
 
+import io
 import sys
 
 __all__ = ["main"]
@@ -9,6 +10,9 @@ def main() -> None:
     """The command `nlbench`; Ctrl-C or SIGTERM at any moment ends it with exit code 130."""
     from nlbench.cli.signals import INTERRUPTED, heeded
 
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # names of files need not be text
+            stream.reconfigure(errors="backslashreplace")
     with heeded():
         try:
             from nlbench.cli.app import app

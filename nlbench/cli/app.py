@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+from contextlib import suppress
 from typing import Annotated, Any
 
 import typer
@@ -24,6 +26,7 @@ from nlbench.cli import (
     verify,
 )
 from nlbench.cli.signals import INTERRUPTED
+from nlbench.engine import memory
 from nlbench.errors import EnvironmentFault, Interrupted, NlbenchError
 
 HELP = """Monte Carlo benchmarks of nonlinear filters.
@@ -45,32 +48,57 @@ Exit codes:
     4  a filter failed, or diverged beyond the limit that the file sets
 """
 
+# Errors of files that are nobody's mistake in the program: disk and quota full, no permission, read-only, too many, ...
+OF_THE_MACHINE = frozenset(
+    getattr(errno, name)
+    for name in "ENOSPC EDQUOT EACCES EPERM EROFS EIO ENAMETOOLONG EMFILE ENFILE ESTALE".split()
+)
+
 
 class Commands(TyperGroup):
     """A group whose commands end with the exit code of the error they raise, in plain words."""
 
     def invoke(self, context: Any) -> Any:
+        json = "--json" in context.args  # before the command takes them
         try:
-            return super().invoke(context)
+            result = super().invoke(context)
+            output.flush()
+            return result
         except (typer.Exit, typer.Abort, BrokenPipeError):
             raise
         except (Exception, KeyboardInterrupt) as error:
-            raise typer.Exit(_ended(error)) from None
+            raise typer.Exit(_ended(error, json)) from None
 
 
-def _ended(error: BaseException) -> int:
-    """The exit code of an error, after saying it in plain words."""
+def _ended(error: BaseException, json: bool) -> int:
+    """The exit code of an error, after saying it in plain words; on stdout too, for a program that reads JSON there."""
     if isinstance(error, KeyboardInterrupt):
         error = Interrupted(INTERRUPTED)
-    if isinstance(error, MemoryError):
-        error = EnvironmentFault("out of memory; `nlbench plan CONFIG` says what an experiment needs")
-    if isinstance(error, NlbenchError):
-        output.complain(str(error))
-        return error.exit_code
-    if type(error).__module__.startswith(("typer", "click")) or os.environ.get("NLBENCH_DEBUG"):
+    if memory.ran_out(error):
+        error = memory.fault(error)
+    if isinstance(error, OSError) and error.errno in OF_THE_MACHINE:
+        where = f"{error.filename}: " if error.filename else "cannot write: "
+        error = EnvironmentFault(f"{where}{error.strerror}")
+    if of_usage := type(error).__module__.startswith(("typer", "click")):
+        code, said = getattr(error, "exit_code", 2), _of_usage(error)
+    elif isinstance(error, NlbenchError):
+        code, said = error.exit_code, str(error)
+    elif os.environ.get("NLBENCH_DEBUG"):
         raise error
-    output.complain(internal(error))
-    return NlbenchError.exit_code
+    else:
+        code, said = NlbenchError.exit_code, internal(error)
+    if json and not getattr(error, "told", False):
+        with suppress(OSError):
+            output.as_json({"exit_code": code, "error": said})
+    if of_usage:  # which typer shows with the usage
+        raise error
+    output.complain(said)
+    return code
+
+
+def _of_usage(error: Any) -> str:
+    """What typer says of a command line that it does not understand."""
+    return str(error.format_message() if hasattr(error, "format_message") else error)
 
 
 def internal(error: BaseException) -> str:

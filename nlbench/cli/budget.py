@@ -47,13 +47,19 @@ class Guard:
 
     def __init__(self, budget: float, show: Progress | None):
         self._budget, self._show = budget, show
-        self._first: tuple[float, int] | None = None
+        self._begun: int | None = None  # runs done before
+        self._first: tuple[float, int] | None = (
+            None  # when the first results of this call came, and the runs done then
+        )
         self._decided = False
 
     def __call__(self, done: int, total: int) -> None:
         if self._show is not None:
             self._show(done, total)
         now = time.monotonic()
+        self._begun = done if self._begun is None else self._begun
+        if done == self._begun:  # workers may still start and compile
+            return
         self._first = self._first or (now, done)
         elapsed, fresh = now - self._first[0], done - self._first[1]
         if self._decided or elapsed < SETTLED or not fresh:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from nlbench.cli import options, output
+from nlbench.cli import options, output, saved
 from nlbench.errors import ConfigError, GateError
 
 
@@ -44,6 +44,8 @@ def compare(
     two_sided: Annotated[
         bool, typer.Option("--two-sided", help="Fail where B is better by more than the margin, too.")
     ] = False,
+    settings: options.Set = None,
+    plugins: options.Plugin = None,
     out: options.Out = Path("results"),
     markdown: Annotated[
         bool, typer.Option("--markdown", help="Print Markdown, for the summary of a CI job.")
@@ -64,20 +66,21 @@ def compare(
     if markdown and json:
         raise ConfigError("--markdown and --json exclude each other")
     numbers = _number("--margin", margin), _number("--alpha", alpha)
-    folders = _folder(a, out), _folder(b, out)
+    folders = saved.found(a, settings, out), saved.found(b, settings, out)
     from nlbench.cli import compared as shown
     from nlbench.comparison.compared import Asked, compared
 
     found = compared(*folders, Asked(*numbers, "all" if everything else statistic))
-    failing = len(found.failing(two_sided))
+    failing = len(found.failing(two_sided)) > 0
+    faults = [GateError(f"gate failed: {shown.verdict(found, two_sided)}")] if failing else []
     if json:
-        output.as_json(shown.facts(found, GateError.exit_code if failing else 0))
+        output.as_json(shown.facts(found, GateError.exit_code if failing else 0), *faults)
     elif markdown:
         shown.markdown(found, two_sided)
     else:
         shown.show(found, two_sided)
-    if failing:
-        raise GateError(f"gate failed: {shown.verdict(found, two_sided)}")
+    if faults:
+        raise faults[0]
 
 
 def _number(option: str, text: str) -> float:
@@ -86,16 +89,3 @@ def _number(option: str, text: str) -> float:
         return float(text.removesuffix("%")) / 100 if text.endswith("%") else float(text)
     except ValueError:
         raise ConfigError(f"{option}: expected a number or a percentage such as 1%, got '{text}'") from None
-
-
-def _folder(where: Path, out: Path) -> Path:
-    """The folder itself, or that of the results of an experiment file."""
-    if not where.exists():
-        raise ConfigError(f"{where}: no such folder of a run, and no such experiment file")
-    if where.is_dir():
-        return where
-    folder = options.folder(options.experiment(where, None, None, None), out)
-    if not folder.is_dir():
-        first = options.command("run", where, None)
-        raise ConfigError(f"{where}: no results in {folder}; make them with: {first}")
-    return folder

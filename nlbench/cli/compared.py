@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from nlbench.cli import output
 from nlbench.cli.changes import HEAD, SHORT, cells, percent
+from nlbench.errors import printable
+from nlbench.report.markdown import plain
 
 if TYPE_CHECKING:
     from nlbench.comparison.compared import Compared
@@ -59,7 +61,11 @@ def verdict(found: Compared, two_sided: bool) -> str:
         counts = ", ".join(f"{count} {word}" for word, count in failing.items())
         return f"{counts} of {len(found.table)} comparisons (margin {margin})"
     if found.identical:
-        return f"equal: all {len(found.table)} comparisons, to the last bit"
+        return (
+            f"equal: all {len(found.table)} comparisons, to the last bit"
+            if len(found.table)
+            else "equal: the same run"
+        )
     if (found.table["verdict"] == "=").all():
         return f"equal: all {len(found.table)} comparisons, but for rounding"
     other = found.table["verdict"].value_counts()
@@ -72,7 +78,7 @@ def show(found: Compared, two_sided: bool) -> None:
     for name, side in (("A", found.a), ("B", found.b)):
         print(f"{output.styled(name, 'bold')}  {side.path}\n   {_described(side)}")
     for line in found.notes:
-        print(textwrap.fill(line, output.WIDTH, initial_indent="   ", subsequent_indent="     "))
+        print(textwrap.fill(printable(line), output.WIDTH, initial_indent="   ", subsequent_indent="     "))
     print(f"\n{_how(found)}")
     if not (found.table["verdict"] == "=").all():
         _table(found)
@@ -111,16 +117,16 @@ def markdown(found: Compared, two_sided: bool) -> None:
     """Print it as GitHub shows it."""
     print(f"### nlbench compare: {verdict(found, two_sided)}\n")
     for name, side in (("A", found.a), ("B", found.b)):
-        print(f"- {name}: `{side.path}`, {_described(side)}")
+        print(f"- {name}: {plain(f'{side.path}, {_described(side)}')}")
     for line in found.notes:
-        print(f"- {_escaped(line)}")
+        print(f"- {plain(line)}")
     chosen, left = _chosen(found)
     print(
         f"\n{_how(found)}\n\n| filter | statistic | t | A | B | B/A | p | |\n|---|---|---|---|---|---|---|---|"
     )
     for row in chosen:
         shown = [row["filter"], *cells(row, len(found.a.units) > 1)]
-        print(f"| {' | '.join(map(_escaped, shown))} |")
+        print(f"| {' | '.join(map(plain, shown))} |")
     if left:
         print(f"\n... and {left} more without a significant change")
     if line := _sensitivity(found):
@@ -189,14 +195,3 @@ def _next(found: Compared, failed: bool) -> tuple[str, str]:
 
 def _cut(text: str, width: int) -> str:
     return text if len(text) <= width else f"{text[: width - 1]}…"
-
-
-def _escaped(text: str) -> str:
-    """Of Markdown: what would end a cell or begin a tag."""
-    return (
-        text.replace("\\", "\\\\")
-        .replace("|", "\\|")
-        .replace("<", "&lt;")
-        .replace("~", "\\~")
-        .replace("*", "\\*")
-    )

@@ -60,10 +60,17 @@ def filter_recorded(
     found = _filtered(experiment, chosen, recorded, start)
     frame = _joined(found)
     facts = _facts(experiment, recorded, found, out)
+    lost = [
+        f"FAILED: {each['filter']}: no finite estimate from {data}:{each['lost_line']} on"
+        for each in facts["filters"]
+        if each["lost_line"] is not None
+    ]
+    faults = [LimitError("\n".join(lost))] if lost else []
     if out is not None or not json:
         _write(frame, out)
     if json:
-        output.as_json(facts if out is not None else {**facts, "estimates": frame.to_dict(orient="records")})
+        estimates = {} if out is not None else {"estimates": frame.to_dict(orient="records")}
+        output.as_json({**facts, **estimates}, *faults)
     else:
         # The estimates have stdout to themselves, so that they can be piped.
         with redirect_stdout(sys.stderr):
@@ -76,13 +83,8 @@ def filter_recorded(
                 "--seed": seed,
             }
             _next(config, data, settings, given, out)
-    lost = [
-        f"FAILED: {each['filter']}: no finite estimate from {data}:{each['lost_line']} on"
-        for each in facts["filters"]
-        if each["lost_line"] is not None
-    ]
-    if lost:
-        raise LimitError("\n".join(lost))
+    if faults:
+        raise faults[0]
 
 
 def _filtered(experiment: Experiment, labels: list[str], recorded: Recording, start: float) -> list[Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,7 +12,7 @@ from nlbench.cli import options, output
 from nlbench.errors import ConfigError
 
 if TYPE_CHECKING:
-    from nlbench.config import Experiment
+    from nlbench.engine.shards import Done
 
 MOST = 64  # groups that are dealt out
 
@@ -35,16 +34,15 @@ def merge(
     """Make the run of which all shards were computed with `run --shard`, byte for byte that of one machine."""
     from nlbench.cli.run import computing, finish, gated
 
-    with output.errors_as_json(json):
-        experiment = options.experiment(config, runs, seed, settings)
-        gated(config, experiment, gate)
+    experiment = options.experiment(config, runs, seed, settings)
+    gated(config, experiment, gate)
 
-        def merged(show: Any) -> Any:
-            from nlbench.engine.shards import merge
+    def merged(show: Any) -> Any:
+        from nlbench.engine.shards import merge
 
-            return merge(experiment, source or [out], out, show)
+        return merge(experiment, source or [out], out, show)
 
-        results = computing(experiment, json, merged)
+    results = computing(experiment, json, merged)
     finish(experiment, results, gate, json)
 
 
@@ -57,26 +55,15 @@ def divided(text: str) -> tuple[int, int]:
     return number, of
 
 
-def shard(
-    experiment: Experiment,
-    division: tuple[int, int],
-    out: Path,
-    json: bool,
-    computing: Callable[..., Any],
-    command: str,
+def show_shard(
+    done: Done, config: Path, stated: dict[str, str | None], settings: list[str] | None, json: bool
 ) -> None:
-    """Compute one shard and say that `command` comes next."""
-    number, of = division
-
-    def computed(show: Any) -> Any:
-        from nlbench.engine.shards import run_shard
-
-        return run_shard(experiment, number, of, out, show)
-
-    done = computing(experiment, json, computed)
+    """Say what a shard has, and which command comes next; stated: the options that `merge` needs."""
+    number, of = done.share.number + 1, done.share.of
     if json:
         facts = {"shard": number, "of": of, "folder": str(done.folder), "runs": done.runs}
         output.as_json({**facts, "runs_in_all": done.total, "exit_code": 0})
         return
     print(f"shard {number} of {of}: {done.runs:,} of {done.total:,} runs, in {done.folder}")
+    command = options.command("merge", config, settings, *options.words(stated))
     output.next_step(command, "once all shards are done; a --from for each folder that has some")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -92,9 +93,9 @@ def precision(text: str | None, runs: str | None) -> PrecisionAsked | None:
     return None if text is None else parse(text)
 
 
-def folder(experiment: Experiment, out: Path) -> Path:
-    """Where the results of the experiment lie."""
-    return out / experiment.experiment / experiment.hash12()
+def words(given: Mapping[str, str | None]) -> list[str]:
+    """Options with their values as the words of a command line, without those that are not given."""
+    return [word for name, value in given.items() if value is not None for word in (name, value)]
 
 
 def command(name: str, config: Path, settings: list[str] | None, *options: str) -> str:
@@ -103,9 +104,9 @@ def command(name: str, config: Path, settings: list[str] | None, *options: str) 
 
     from nlbench import plugins
 
-    words = ["nlbench", name, str(config), *options]
+    line = ["nlbench", name, str(config), *options]
     for path in plugins.files():
-        words += ["--plugin", path]
+        line += ["--plugin", path]
     for each in settings or []:
-        words += ["--set", each]
-    return shlex.join(words)
+        line += ["--set", each]
+    return shlex.join(line)

@@ -7,11 +7,14 @@ import math
 import os
 import sys
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, TextIO
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, TextIO
 
-from nlbench.errors import NlbenchError, printable
+from nlbench.errors import printable
+
+if TYPE_CHECKING:
+    from nlbench.errors import NlbenchError
 
 WIDTH = 80
 STYLES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33"}
@@ -26,8 +29,18 @@ def styled(text: str, style: str, stream: TextIO | None = None) -> str:
 
 def complain(message: str) -> None:
     """An error, on stderr; names of files may hold characters that command a terminal."""
-    sys.stdout.flush()
+    with suppress(OSError):
+        flush()
     print(printable(message), file=sys.stderr)
+
+
+def flush() -> None:
+    """Have what was printed reach its reader. Where it cannot it is dropped, so that Python can end as it should."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise
 
 
 def next_step(command: str, why: str) -> None:
@@ -35,20 +48,11 @@ def next_step(command: str, why: str) -> None:
     print(f"\n{styled('next', 'bold')}: {command}\n      {why}")
 
 
-def as_json(value: Any) -> None:
-    """One JSON document; what is not finite becomes null."""
+def as_json(value: Any, *faults: NlbenchError) -> None:
+    """One JSON document; what is not finite becomes null. faults: what the command raises next, which it tells."""
+    for each in faults:
+        each.told = True
     print(json.dumps(_finite(value), indent=2, ensure_ascii=False))
-
-
-@contextmanager
-def errors_as_json(wanted: bool) -> Iterator[None]:
-    """Have an error on stdout too, for the program that reads JSON there: its exit code and what it says."""
-    try:
-        yield
-    except NlbenchError as error:
-        if wanted:
-            as_json({"exit_code": error.exit_code, "error": str(error)})
-        raise
 
 
 def _finite(value: Any) -> Any:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from nlbench.perf.baseline import Baseline
     from nlbench.perf.gate import Finding
 
+BUDGET = "25%"
 STYLES = {"pass": "green", "slower": "red", "counts rose": "red", "undecided": "yellow"}
 
 
@@ -28,8 +29,9 @@ def perf(
         typer.Option("--baseline", metavar="FILE", help="Baseline to compare with [perf-baseline.json]."),
     ] = None,
     budget: Annotated[
-        str, typer.Option("--budget", metavar="P%", help="How much slower a workload may become.")
-    ] = "25%",
+        str | None,
+        typer.Option("--budget", metavar="P%", help="How much slower a workload may become [25%]."),
+    ] = None,
     record: Annotated[bool, typer.Option("--record", help="Write the baseline.")] = False,
     plugins: options.Plugin = None,
     json: options.Json = False,
@@ -38,20 +40,23 @@ def perf(
 
     Exits with 3 if one became slower beyond the budget, or its program grew.
     """
-    allowed = _fraction(budget)
+    allowed = _fraction(budget or BUDGET)
+    from nlbench.perf import timing
+
+    timing.on_one_thread()  # before jax starts, as the check of a plug-in has it do
     experiments = [options.experiment(each, None, None, None) for each in configs or []]
     precisions = {each.engine.precision for each in experiments} | (set() if experiments else {"float64"})
     if precisions != {"float64"}:
         raise ConfigError("perf: the reference kernel is float64; engine.precision must be too")
-    from nlbench.perf.baseline import DEFAULT, of, read, write
+    from nlbench.perf.baseline import DEFAULT, of, read, refuse_others, write
     from nlbench.perf.kernel import identity
 
     path = baseline or DEFAULT
+    if budget and not record and not path.exists():
+        raise NothingCompared(f"{path}: no baseline to compare with; make one with --record")
     before = None if record or (baseline is None and not path.exists()) else read(path, identity())
     from nlbench import runtime
-    from nlbench.perf import timing
 
-    timing.on_one_thread()
     runtime.configure()
     from nlbench.perf import gate, kernel, workloads
     from nlbench.results.fingerprint import differences, fingerprint
@@ -61,24 +66,28 @@ def perf(
     machine = fingerprint()
     if before and not counts.keys() & before.entries.keys():
         raise NothingCompared(f"{path}: has none of {', '.join(counts)}")
+    if before:
+        refuse_others(path, before, chosen)
     timer = timing.Timer(kernel.reference(), {each.name: each.call for each in chosen}, timing.clock())
     if before is None:
         estimates = gate.measured(timer.rounds, list(counts), gate.RECORDED_BAND if record else math.inf)
         if record:
-            write(path, of(identity(), machine, estimates, counts))
+            write(path, of(identity(), machine, estimates, chosen))
         findings = [gate.Finding(name, each, None, None, gate.NEW, {}) for name, each in estimates.items()]
         other: list[str] = []
     else:
         other = differences(machine, before.machine)
         findings = gate.compared(timer.rounds, counts, before, allowed, same_compiler=not other)
-    failed = [each for each in findings if each.verdict in gate.FAILURES]
+    failed = ", ".join(f"{each.name} {each.verdict}" for each in findings if each.verdict in gate.FAILURES)
+    faults = [GateError(f"gate failed: {failed}")] if failed else []
     if json:
-        output.as_json(_facts(findings, counts, before, allowed, other, 3 if failed else 0))
+        code = GateError.exit_code if faults else 0
+        output.as_json(_facts(findings, counts, before, allowed, other, code), *faults)
     else:
-        _show(findings, before, budget, other)
+        _show(findings, before, budget or BUDGET, other)
         _next(path, configs or [], before is not None, record)
-    if failed:
-        raise GateError(f"gate failed: {', '.join(f'{each.name} {each.verdict}' for each in failed)}")
+    if faults:
+        raise faults[0]
 
 
 def _fraction(text: str) -> float:

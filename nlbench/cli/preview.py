@@ -21,7 +21,7 @@ def validate(
         experiment = options.experiment(config, runs, seed, settings)
     except ConfigError as error:
         if json:
-            output.as_json({"valid": False, "problems": [each._asdict() for each in error.problems]})
+            output.as_json({"valid": False, "problems": [each._asdict() for each in error.problems]}, error)
         raise
     if json:
         output.as_json({"valid": True, "hash": experiment.hash12(), "resolved": experiment.resolved()})
@@ -67,11 +67,9 @@ def plan(
         output.as_json(cost)
         return
     planned.show(experiment, cost)
-    given = {"--runs": runs, "--precision": precision, "--seed": seed}
-    words = [str(word) for pair in given.items() if pair[1] for word in pair]
-    if out != Path("results"):
-        words += ["--out", str(out)]
-    output.next_step(options.command("run", config, settings, *words), "runs it")
+    other = None if out == Path("results") else str(out)
+    given = {"--runs": runs, "--precision": precision, "--seed": seed, "--out": other}
+    output.next_step(options.command("run", config, settings, *options.words(given)), "runs it")
 
 
 def doctor(json: options.Json = False) -> None:
@@ -82,11 +80,12 @@ def doctor(json: options.Json = False) -> None:
     runtime.configure()
     findings = [(str(name), bool(ok), str(detail)) for name, ok, detail in machine.doctor()]
     wrong = [name for name, ok, _ in findings if not ok]
+    faults = [EnvironmentFault(f"not in order: {', '.join(wrong)}")] if wrong else []
     if json:
-        output.as_json([{"name": name, "ok": ok, "detail": detail} for name, ok, detail in findings])
+        output.as_json([{"name": name, "ok": ok, "detail": detail} for name, ok, detail in findings], *faults)
     else:
         output.definitions((f"{'ok  ' if ok else 'BAD '} {name}", detail) for name, ok, detail in findings)
         if not wrong:
             output.next_step("nlbench list experiments", "shows what there is to run")
-    if wrong:
-        raise EnvironmentFault(f"not in order: {', '.join(wrong)}")
+    if faults:
+        raise faults[0]

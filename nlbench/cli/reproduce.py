@@ -72,7 +72,7 @@ def reproduce(
     if record:
         faults = [each for each in faults if each.exit_code != 3]
     if json:
-        output.as_json(_facts(done, faults[0].exit_code if faults else 0))
+        output.as_json(_facts(done, faults[0].exit_code if faults else 0), *faults)
     else:
         _show(done, wanted, found)
     for each in faults[1:]:

@@ -14,6 +14,7 @@ from nlbench.errors import ConfigError
 if TYPE_CHECKING:
     from nlbench.config import Experiment
     from nlbench.config.precision import Precision
+    from nlbench.engine.shards import Done
 
 
 def run(
@@ -45,43 +46,55 @@ def run(
 
     What was computed before is kept: a larger --runs tops up, the same command after an interruption goes on.
     """
+    asked = options.precision(precision, runs)
+    longest = None if yes else budget.seconds(limit)
+    experiment = options.experiment(config, runs, seed, settings)
+    if shard is not None:
+        if dask or gate or asked:
+            raise ConfigError("--shard goes with none of --dask, --precision and --gate")
+        done = _shard(experiment, merge.divided(shard), out, longest, quiet=json)
+        merge.show_shard(done, config, {"--runs": runs, "--seed": seed, "--from": str(out)}, settings, json)
+        return
+    gated(config, experiment, gate)
+    if dask is not None:
+        from nlbench.engine.cluster import checked
+
+        checked(dask)
+    if asked is not None:
+        experiment, runs_chosen = _chosen(experiment, out, asked, longest, quiet=json)
+
+    def computed(show: Any) -> Any:
+        from nlbench import engine
+
+        return engine.run(experiment, out, progress=show, check=_check(longest), dask=dask)
+
+    results = computing(experiment, json, computed, longest)
     chosen: dict[str, Any] = {}
-    with output.errors_as_json(json):
-        asked = options.precision(precision, runs)
-        longest = None if yes else budget.seconds(limit)
-        experiment = options.experiment(config, runs, seed, settings)
-        if shard is not None:
-            if dask or gate or asked:
-                raise ConfigError("--shard goes with none of --dask, --precision and --gate")
-            division, stated = (
-                merge.divided(shard),
-                [("--runs", runs), ("--seed", seed), ("--from", str(out))],
-            )
-            words = [word for name, value in stated if value is not None for word in (name, value)]
-            command = options.command("merge", config, settings, *words)
-            merge.shard(experiment, division, out, json, computing, command)
-            return
-        gated(config, experiment, gate)
-        if dask is not None:
-            from nlbench.engine.cluster import checked
+    if asked is not None:
+        from nlbench.cli import summary
 
-            checked(dask)
-        if asked is not None:
-            experiment, runs_chosen = _chosen(experiment, out, asked, longest, quiet=json)
-
-        def computed(show: Any) -> Any:
-            from nlbench import engine
-            from nlbench.engine.planning.space import require
-
-            check = None if longest is None else require
-            return engine.run(experiment, out, progress=show, check=check, dask=dask)
-
-        results = computing(experiment, json, computed, longest)
-        if asked is not None:
-            from nlbench.cli import summary
-
-            chosen = {"precision": summary.precision(asked, runs_chosen, experiment, results)}
+        chosen = {"precision": summary.precision(asked, runs_chosen, experiment, results)}
     finish(experiment, results, gate, json, chosen)
+
+
+def _check(longest: float | None) -> Any:
+    """What is looked at before anything is computed, unless the user said --yes."""
+    from nlbench.engine.planning.space import require
+
+    return None if longest is None else require
+
+
+def _shard(
+    experiment: Experiment, division: tuple[int, int], out: Path, longest: float | None, quiet: bool
+) -> Done:
+    """One shard, computed."""
+
+    def computed(show: Any) -> Any:
+        from nlbench.engine.shards import run_shard
+
+        return run_shard(experiment, *division, out, show, _check(longest))
+
+    return computing(experiment, quiet, computed, longest)
 
 
 def gated(config: Path, experiment: Experiment, gate: bool) -> None:
@@ -94,14 +107,13 @@ def finish(
     experiment: Experiment, results: Any, gate: bool, json: bool, more: dict[str, Any] | None = None
 ) -> None:
     """Report and print the essence, and `more` facts; raises the gravest of what makes the command fail."""
-    with output.errors_as_json(json):
-        report = _reported(results)
+    report = _reported(results)
     from nlbench.cli import summary
 
     facts = {**summary.facts(experiment, results, report), **(more or {})}
     faults = summary.faults(experiment, facts, gate)
     if json:
-        output.as_json({**facts, "exit_code": faults[0].exit_code if faults else 0})
+        output.as_json({**facts, "exit_code": faults[0].exit_code if faults else 0}, *faults)
     else:
         summary.show(experiment, facts)
         output.next_step(f"open {report}", "all figures and tables on one page; it needs no network")
@@ -119,11 +131,10 @@ def _chosen(
     def choose(show: Any) -> Any:
         from nlbench.engine.planning.precision import choose
 
-        return choose(experiment, asked, out, show)
+        return choose(experiment, asked, out, show, _check(longest))
 
     chosen = computing(experiment, quiet, choose, longest)
-    counts = experiment.monte_carlo.model_copy(update={"runs": chosen.runs})
-    return experiment.model_copy(update={"monte_carlo": counts}), chosen
+    return experiment.of_runs(chosen.runs), chosen
 
 
 def computing(

@@ -34,9 +34,11 @@ def report(
 
 def found(where: Path, settings: list[str] | None, out: Path) -> Path:
     """The folder of a run, given by itself or by its experiment file. Raises `ConfigError` where there is none."""
+    if not where.exists():
+        raise ConfigError(f"{where}: no such folder of a run, and no such experiment file")
     if where.is_dir():
         return where
-    folder = options.folder(options.experiment(where, None, None, settings), out)
+    folder = options.experiment(where, None, None, settings).folder(out)
     if not folder.is_dir():
         first = options.command("run", where, settings)
         raise ConfigError(f"{where}: no results in {folder}; make them with: {first}")
@@ -49,6 +51,7 @@ def replay(
     trajectory: Annotated[
         int, typer.Option("--trajectory", metavar="N", min=0, help="Number of the run, from 0.")
     ],
+    runs: options.Runs = None,
     seed: options.Seed = None,
     settings: options.Set = None,
     plugins: options.Plugin = None,
@@ -58,7 +61,7 @@ def replay(
     json: options.Json = False,
 ) -> None:
     """Show one run of one filter, step by step."""
-    experiment = options.experiment(config, None, seed, settings)
+    experiment = options.experiment(config, runs, seed, settings)
     if label not in experiment.labels:
         from nlbench.suggestions import suggestion
 
@@ -80,7 +83,6 @@ def replay(
         return
     else:
         print(frame.to_string(index=False, line_width=output.WIDTH))
-    other = options.command(
-        "replay", config, settings, "--filter", label, "--trajectory", str(trajectory + 1)
-    )
+    given = {"--filter": label, "--trajectory": str(trajectory + 1), "--runs": runs, "--seed": seed}
+    other = options.command("replay", config, settings, *options.words(given))
     output.next_step(other, "shows the next run")

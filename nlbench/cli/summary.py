@@ -25,7 +25,7 @@ def facts(experiment: Experiment, results: Any, report: Path) -> dict[str, Any]:
     return {
         "experiment": experiment.experiment,
         "hash": experiment.hash12(),
-        "runs": experiment.monte_carlo.runs,
+        "runs": results.manifest["runs"],  # at least those asked for
         "seed": experiment.monte_carlo.seed,
         "folder": str(folder),
         "report": str(report),

@@ -27,14 +27,14 @@ def verify(
     Every file against its checksum; one block, with the 64th of the runs that are summed with it, computed again bit
     for bit; and the tables made again from the sums. Nothing is written. Exit code 5 if anything is wrong.
     """
-    with output.errors_as_json(json):
-        folder = saved.found(where, settings, out)
-        from nlbench import engine
+    folder = saved.found(where, settings, out)
+    from nlbench import engine
 
-        found = engine.verify(folder, block)
-    code = DamagedResults.exit_code if found.faults else 0
+    found = engine.verify(folder, block)
+    faults = [DamagedResults("\n".join(found.faults))] if found.faults else []
     if json:
-        output.as_json({"folder": str(folder), **found._asdict(), "exit_code": code})
+        code = DamagedResults.exit_code if faults else 0
+        output.as_json({"folder": str(folder), **found._asdict(), "exit_code": code}, *faults)
     elif not found.faults:
         print(f"{folder}: sound")
         shown = [("files", f"{found.files} as they were written")]
@@ -48,5 +48,5 @@ def verify(
         for each in found.remarks:
             print(f"  {each}")
         output.next_step(f"nlbench report {folder}", "draws the figures and writes the report")
-    if found.faults:
-        raise DamagedResults("\n".join(found.faults))
+    if faults:
+        raise faults[0]

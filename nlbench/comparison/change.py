@@ -1,7 +1,8 @@
 """The change of one statistic from A to B, tested on the same runs where there are such, otherwise as independent.
 
 Of errors (rms, rms_clipped, rms_run_mean, median_error) the logarithm of the ratio B/A is tested, of other statistics,
-which may have either sign, the relative difference (B - A)/|A|.
+which may have either sign, the relative difference (B - A)/|A|. Where A is 0 nothing is relative to it: the difference
+itself is tested, against no margin.
 
 The runs are paired by their numbers where the seeds agree. Two runs of one number saw the same truth and noise; were
 the problems different, their random numbers would still be the same, and different pairs are independent in any case,
@@ -65,12 +66,21 @@ class Measured(NamedTuple):
         )
         return known and not self.same and min(self.n_a, self.n_b) >= LEAST_RUNS
 
+    @property
+    def from_zero(self) -> bool:
+        """Whether the change is the difference itself."""
+        return _from_zero(self.quantity, self.a, self.b)
+
     def ratio(self, effect: float) -> float:
         """The ratio B/A of a change; 1 + (B - A)/|A| of statistics that may have either sign."""
+        if self.from_zero:
+            return math.nan
         return math.exp(min(effect, 700.0)) if self.by_ratio else 1 + effect
 
     def slack(self, margin: float) -> float:
         """The margin on the scale of the change."""
+        if self.from_zero:
+            return 0.0
         return math.log1p(margin) if self.by_ratio else margin
 
 
@@ -104,7 +114,8 @@ def _together(a: Side, b: Side, quantity: Quantity) -> Measured | None:
     if n < 2:
         return Measured(quantity, value_a, value_b, n, n, True, Change(effect, math.nan, 0.0))
     with np.errstate(invalid="ignore", divide="ignore"):
-        shares = on_b / _unit(quantity, value_a, value_b) - on_a / _unit(quantity, value_a, value_a)
+        units = _units(quantity, value_a, value_b)
+        shares = on_b / units[1] - on_a / units[0]
     sure = math.isinf(effect) or not np.isfinite(shares).all()
     change = Change(
         effect, 0.0 if sure else standard_error(shares), math.inf if sure else effective_degrees(shares)
@@ -116,8 +127,8 @@ def _together(a: Side, b: Side, quantity: Quantity) -> Measured | None:
 def _apart(a: Side, b: Side, quantity: Quantity) -> Measured:
     """As of independent runs."""
     first, second = a.estimate(quantity), b.estimate(quantity)
-    units = _unit(quantity, first.value, first.value), _unit(quantity, first.value, second.value)
-    stderrs = [each.stderr / unit if unit else 0.0 for each, unit in zip((first, second), units, strict=True)]
+    units = _units(quantity, first.value, second.value)
+    stderrs = [each.stderr / unit for each, unit in zip((first, second), units, strict=True)]
     degrees = (
         satterthwaite(stderrs, (first.degrees, second.degrees)) if first.degrees and second.degrees else 0.0
     )
@@ -128,11 +139,18 @@ def _apart(a: Side, b: Side, quantity: Quantity) -> Measured:
 def _effect(quantity: Quantity, a: float, b: float) -> float:
     if a == b or math.isnan(a) or math.isnan(b):
         return b - a
-    if quantity.statistic in SIZES:
-        return math.log(b / a) if a > 0 and b > 0 else math.copysign(math.inf, b - a)
-    return (b - a) / abs(a) if a else math.copysign(math.inf, b - a)
+    if _from_zero(quantity, a, b):
+        return b - a
+    return math.log(b / a) if quantity.statistic in SIZES else (b - a) / abs(a)
 
 
-def _unit(quantity: Quantity, a: float, value: float) -> float:
-    """By what an error of `value` is divided to become one of the change: d log x = dx/x, or dx/|A|."""
-    return value if quantity.statistic in SIZES else abs(a)
+def _from_zero(quantity: Quantity, a: float, b: float) -> bool:
+    """Whether there is no ratio: of errors, which are never negative, neither to zero nor from it."""
+    return a == 0 or (b == 0 and quantity.statistic in SIZES)
+
+
+def _units(quantity: Quantity, a: float, b: float) -> tuple[float, float]:
+    """By what errors of both values are divided to become those of the change: d log x = dx/x, dx/|A|, or dx."""
+    if _from_zero(quantity, a, b):
+        return 1.0, 1.0
+    return (a, b) if quantity.statistic in SIZES else (abs(a), abs(a))

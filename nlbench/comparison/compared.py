@@ -52,8 +52,10 @@ def compared_sides(first: Side, second: Side, asked: Asked) -> Compared:
     shared = common(first, second)
     rows = list(_measured(first, second, shared, names, asked.statistics == ALL))
     tested = [row for row in rows if row.testable and not missing(row)]
+    identical = first.checksums == second.checksums
     # Fractions without any diverged run are the same whatever the number of runs: they alone are no comparison.
-    if not rows or not (tested or any(map(missing, rows)) or all(row.same for row in rows)):
+    said = tested or any(map(missing, rows)) or (rows and all(row.same for row in rows))
+    if not (identical or said):
         what = "all statistics" if names is None else ", ".join(names)
         raise NothingCompared(
             f"nothing was compared: {what} of {', '.join(shared.labels)} at t = "
@@ -61,7 +63,6 @@ def compared_sides(first: Side, second: Side, asked: Asked) -> Compared:
             "or not at all"
         )
     notes = (*shared.notes, *_lost_in_both(first, second, shared))
-    identical = first.checksums == second.checksums
     return Compared(first, second, asked, table(rows, tested, asked), len(tested), notes, identical)
 
 

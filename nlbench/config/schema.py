@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
@@ -264,3 +265,11 @@ class Experiment(Section):
         del plain["monte_carlo"]["runs"]
         plain["engine"] = {name: plain["engine"][name] for name in DECIDING}
         return canonical_hash({key: value for key, value in plain.items() if key not in READ})
+
+    def folder(self, out: str | Path) -> Path:
+        """Where its results lie below `out`."""
+        return Path(out) / self.experiment / self.hash12()
+
+    def of_runs(self, runs: int) -> Experiment:
+        """The same with so many runs."""
+        return self.model_copy(update={"monte_carlo": self.monte_carlo.model_copy(update={"runs": runs})})

@@ -4,25 +4,29 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nlbench.errors import ConfigError
 from nlbench.perf.counts import COUNTS
 from nlbench.perf.verdict import Estimate
 from nlbench.results.atomic import atomic_write
 
+if TYPE_CHECKING:
+    from nlbench.perf.workloads import Workload
+
 DEFAULT = Path("perf-baseline.json")
 SCHEMA = 1
 
 
 class Entry(NamedTuple):
-    """What the baseline says of a workload."""
+    """What the baseline says of a workload; experiment: its hash, "" where that was not noted."""
 
     log_ratio: float
     band: float
     counts: dict[str, float]
+    experiment: str = ""
 
 
 class Baseline(NamedTuple):
@@ -37,17 +41,38 @@ def of(
     kernel: str,
     machine: dict[str, str],
     estimates: Mapping[str, Estimate],
-    counts: Mapping[str, dict[str, float]],
+    workloads: Sequence[Workload],
 ) -> Baseline:
-    """The baseline that these measurements make."""
-    entries = {name: Entry(each.log_ratio, each.band, counts[name]) for name, each in estimates.items()}
+    """The baseline that these measurements of workloads make."""
+    entries = {
+        each.name: Entry(*estimates[each.name][:2], each.counts, each.experiment) for each in workloads
+    }
     return Baseline(kernel, machine, entries)
+
+
+def refuse_others(path: Path, baseline: Baseline, workloads: Sequence[Workload]) -> None:
+    """Raises `ConfigError` where a workload has the name of one in the baseline and is of another experiment."""
+    other = [
+        each.name
+        for each in workloads
+        if (known := baseline.entries.get(each.name)) and known.experiment not in ("", each.experiment)
+    ]
+    if other:
+        raise ConfigError(
+            f"{path}: was measured on other experiments of the same names ({', '.join(other)}); make a new one with "
+            "--record"
+        )
 
 
 def write(path: Path, baseline: Baseline) -> None:
     """Write the file, whole or not at all."""
     entries = {
-        name: {"ratio": math.exp(each.log_ratio), "band": each.band, "counts": each.counts}
+        name: {
+            "ratio": math.exp(each.log_ratio),
+            "band": each.band,
+            "counts": each.counts,
+            "experiment": each.experiment,
+        }
         for name, each in baseline.entries.items()
     }
     plain = {"schema": SCHEMA, "kernel": baseline.kernel, "machine": baseline.machine, "workloads": entries}
@@ -87,4 +112,4 @@ def _entry(plain: Any) -> Entry:
     counts = {name: float(value) for name, value in plain["counts"].items() if name in COUNTS}
     if not (ratio > 0 and band >= 0 and all(map(math.isfinite, (ratio, band, *counts.values())))):
         raise ValueError("not a positive, finite number")
-    return Entry(math.log(ratio), band, counts)
+    return Entry(math.log(ratio), band, counts, str(plain.get("experiment", "")))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from nlbench.errors import ConfigError
 from nlbench.perf.counts import counted
 
 if TYPE_CHECKING:
@@ -40,11 +41,12 @@ GROWTH: dict[str, Any] = {
 
 
 class Workload(NamedTuple):
-    """A compiled program with its data, and its counts."""
+    """A compiled program with its data, its counts, and what identifies the experiment behind it, if there is one."""
 
     name: str
     call: Callable[[], object]
     counts: dict[str, float]
+    experiment: str = ""
 
 
 def standard() -> list[Workload]:
@@ -56,7 +58,15 @@ def standard() -> list[Workload]:
 
 
 def of_experiments(experiments: Sequence[Experiment]) -> list[Workload]:
-    """Each filter of each experiment; references are left out."""
+    """Each filter of each experiment; references are left out.
+
+    Raises `ConfigError` where two have one name, by which baselines know them.
+    """
+    names = [each.experiment for each in experiments]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise ConfigError(
+            f"perf: several files have the experiment {', '.join(twice)}; give each a name of its own"
+        )
     return [each for experiment in experiments for each in _filters(experiment)]
 
 
@@ -70,7 +80,8 @@ def _filters(experiment: Experiment) -> list[Workload]:
     simulated = partial(block.trajectories, stated, block.words(SEED))
     data = jax.block_until_ready(jax.jit(lambda lanes: jax.lax.map(simulated, lanes))(chunk.lanes))
     runners = stated.runners[: len(experiment.filters)]
-    return [alone(f"{experiment.experiment} {each.label}", stated, each, data) for each in runners]
+    found = [alone(f"{experiment.experiment} {each.label}", stated, each, data) for each in runners]
+    return [each._replace(experiment=experiment.hash12()) for each in found]
 
 
 def alone(name: str, problem: Problem, runner: Runner, data: Any) -> Workload:

@@ -17,13 +17,18 @@ def brief(results: Results) -> str:
 
 
 def write(results: Results) -> Path:
-    """Draw the figures of a run and write its `report.html`. Returns the path of the page."""
+    """Draw the figures of a run and write its `report.html`. Returns the path of the page.
+
+    Raises `LockedError` where a live run, or another report, is writing in the folder.
+    """
     from nlbench import figures
     from nlbench.report.contents import contents
     from nlbench.report.template import render
     from nlbench.results.atomic import atomic_write
+    from nlbench.results.folder import RunFolder
 
-    drawn = figures.draw(results)
     path = results.path / "report.html"
-    atomic_write(path, render("report/page.html", **contents(results, drawn)).encode())
+    with RunFolder(results.path).locked():
+        drawn = figures.draw(results)
+        atomic_write(path, render("report/page.html", **contents(results, drawn)).encode())
     return path

@@ -101,7 +101,7 @@ def jobs(chosen: Chosen, configs: Path, out: Path, quick: bool = False) -> list[
             problems += error.problems
             continue
         runs = experiment.monte_carlo.runs
-        folder = out / experiment.experiment / experiment.hash12()
+        folder = experiment.folder(out)
         runs = min(runs, _quick_runs(experiment)) if quick else runs
         found.append(Job(name, file, settings, experiment, runs, folder))
     if problems:

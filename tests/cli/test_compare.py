@@ -158,10 +158,22 @@ def test_a_failed_filter_fails_the_gate(tmp_path, folder):
     assert "1 FAILED of 7 comparisons" in done.stdout
 
 
-def test_labels_that_look_like_markdown_or_terminal_codes_stay_text(tmp_path):
-    import nlbench.cli.compared as shown
+def test_labels_that_look_like_markdown_or_terminal_codes_stay_text(folder, tmp_path):
+    """Labels, versions and the like may be a stranger's."""
+    a, b = (
+        folder("a"),
+        made.folder(tmp_path / "b", made.side(1.05 * ERROR, 1), versions={"x": "[y](z)\x1b[2J"}),
+    )
+    done = compare(a, b, "--markdown")
+    assert r"\[y\](z)\\x1b\[2J" in done.stdout
+    assert "\x1b" not in done.stdout + compare(a, b).stdout
 
-    assert shown._escaped("a|b<script>*~") == "a\\|b&lt;script>\\*\\~"
+
+def test_a_run_of_filters_that_all_failed_equals_itself(tmp_path):
+    side = made.side(ERROR, 1, lost=np.ones(ERROR.shape, bool))
+    done = compare(made.folder(tmp_path / "a", side), made.folder(tmp_path / "b", side))
+    assert (done.exit_code, done.stderr) == (0, "")
+    assert "equal: the same run" in done.stdout
 
 
 def test_options_that_exclude_each_other_are_refused(folder):

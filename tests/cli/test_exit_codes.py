@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import IO
 
 import pytest
 from typer.testing import CliRunner
@@ -74,6 +76,7 @@ ERRORS = [
     (errors.Interrupted("x"), 130),
     (KeyboardInterrupt(), 130),
     (MemoryError(), 5),
+    (OSError(errno.ENOSPC, "No space left on device"), 5),
     (ZeroDivisionError("by design"), 1),
 ]
 
@@ -103,6 +106,48 @@ def test_an_internal_error_is_one_line_and_its_traceback_is_put_aside(tmp_path, 
     (kept,) = tmp_path.glob("nlbench-*.txt")
     assert str(kept) in done.stderr
     assert "Traceback" in kept.read_text()
+
+
+@pytest.mark.parametrize("name", ["plan", "replay"])
+def test_memory_that_runs_out_is_no_internal_error(tmp_path, monkeypatch, name):
+    def fail(*arguments):
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(f"nlbench.engine.{'trace' if name == 'replay' else 'planning.plan'}.make", fail)
+    more = ["--filter", "third-order-guarded", "--trajectory", "0"] if name == "replay" else []
+    done = CliRunner().invoke(app, [name, str(written(tmp_path, VALID)), *more])
+    assert done.exit_code == 5
+    assert done.stderr.startswith("out of memory: can't start new thread. ")
+
+
+def test_stdout_that_is_full_or_closed_does_not_hide_how_a_command_ends(tmp_path):
+    good = written(tmp_path, VALID, "good.yaml")
+    with Path("/dev/full").open("w") as full:
+        done = piped("validate", good, stdout=full)
+    assert (done.returncode, done.stderr) == (5, "cannot write: No space left on device\n")
+    bad = written(tmp_path, spoiled("limiter", "limter"), "bad.yaml")
+    with Path("/dev/full").open("w") as full:
+        done = piped("validate", bad, stdout=full)
+    assert done.returncode == 2
+    assert "did you mean 'limiter'?" in done.stderr
+    with Path("/dev/full").open("w") as full:
+        done = piped("validate", bad, "--json", stdout=full)
+    assert (done.returncode, done.stderr) == (5, "cannot write: No space left on device\n")
+
+
+def piped(*arguments: str | Path, stdout: IO[str]) -> subprocess.CompletedProcess[str]:
+    line = [sys.executable, "-m", "nlbench", *map(str, arguments)]
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    return subprocess.run(
+        line, stdout=stdout, stderr=subprocess.PIPE, text=True, env=environment, check=False
+    )
+
+
+def test_names_that_are_no_text_are_printed(tmp_path):
+    name = os.fsdecode(b"r\xff.yaml")
+    done = command("validate", written(tmp_path, VALID, name).name, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert r"r\udcff.yaml: valid" in done.stdout
 
 
 @pytest.mark.parametrize("interrupts", [signal.default_int_handler, signal.SIG_IGN])

@@ -128,8 +128,16 @@ def test_a_run_beyond_its_budget_is_stopped_after_some_seconds(monkeypatch):
         guarded(monkeypatch, 970.0, [(0.0, 10_000), (1.0, 11_000), (10.0, 20_000)])
 
 
+def test_time_in_which_workers_start_is_not_taken_for_slowness(monkeypatch):
+    # The first block after a minute of compiling elsewhere; then 1,000 runs a second.
+    reports = [(0.0, 0), (60.0, 64), (61.0, 1_064), (64.0, 4_064)]
+    assert len(guarded(monkeypatch, 1000.0, reports)) == 4
+    with pytest.raises(ConfigError, match="would take about"):
+        guarded(monkeypatch, 990.0, reports)
+
+
 def test_a_run_that_becomes_slow_later_is_not_stopped(monkeypatch):
-    assert len(guarded(monkeypatch, 1000.0, [(0.0, 0), (5.0, 10_000), (500.0, 11_000)])) == 3
+    assert len(guarded(monkeypatch, 1000.0, [(0.0, 0), (1.0, 2_000), (5.0, 10_000), (500.0, 11_000)])) == 4
 
 
 def test_a_billion_runs_are_refused_without_a_question(tmp_path, monkeypatch):

@@ -72,7 +72,7 @@ def invoke(tmp_path, monkeypatch):
             "divergence": divergence(dict.fromkeys(LABELS, 0) | (diverged or {})),
             "claims": claims(verdict),
         }
-        results = SimpleNamespace(path=tmp_path / "r", table=tables.__getitem__)
+        results = SimpleNamespace(path=tmp_path / "r", table=tables.__getitem__, manifest={"runs": 20_000})
         monkeypatch.setattr(engine, "run", lambda *arguments, **keywords: results)
         monkeypatch.setattr(report, "write", lambda results: results.path / "report.html", raising=False)
         return CliRunner().invoke(app, ["run", str(written(tmp_path, text)), *options])

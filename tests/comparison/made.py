@@ -61,7 +61,8 @@ def tables(
             for name, value in (("rms", error[f, t, alive]), ("rms_clipped", capped)):
                 n = len(value)
                 rms = np.sqrt(np.mean(value**2)) if n else np.nan
-                stderr = np.std(value**2) / (2 * rms) / np.sqrt(n - 1) if n > 1 else np.nan
+                spread = np.std(value**2) / np.sqrt(n - 1) if n > 1 else np.nan
+                stderr = spread / (2 * rms) if rms > 0 else spread
                 rows.append((label, str(time), "x", name, rms, stderr, n))
             own = error[f, t, alive]
             mean, spread = (own.mean(), own.std() / np.sqrt(len(own))) if len(own) else (np.nan, np.nan)

@@ -39,6 +39,18 @@ def test_rounding_is_no_change():
     assert set(done.table["verdict"]) == {"="}
 
 
+@pytest.mark.parametrize("seed", [1, 2], ids=["paired", "apart"])
+def test_a_change_from_zero_is_judged_by_its_standard_error(seed):
+    """Nothing is relative to zero; a mean that differs from it by chance is no change."""
+    asked = Asked(0.01, 0.01, ["mean_error", "rms"])
+    table = compared_sides(made.side(0 * ERROR, 1), made.side(ERROR, seed), asked).table
+    assert table["ratio"].isna().all()
+    said = table.groupby("statistic")["verdict"].unique().map(list).to_dict()
+    assert said == {"mean_error": ["~"], "rms": ["worse"]}
+    biased = compared_sides(made.side(0 * ERROR, 1), made.side(ERROR + 0.5, seed), asked).table
+    assert set(biased["verdict"]) == {"worse", "changed"}
+
+
 def test_worse_better_and_slight_changes_are_told_apart():
     scale = np.array([1.03, 0.97, 1.005])[:, None, None] * (
         1 + 0.001 * np.random.default_rng(2).normal(size=ERROR.shape)

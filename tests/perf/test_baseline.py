@@ -10,18 +10,22 @@ from typer.testing import CliRunner
 
 from nlbench.cli.app import app
 from nlbench.errors import ConfigError
-from nlbench.perf import baseline, kernel
+from nlbench.perf import baseline, kernel, workloads
+from nlbench.perf.workloads import Workload
+from tests import small_runs
 
 GOOD = {
     "schema": 1,
     "kernel": "k",
     "machine": {"jaxlib": "1"},
-    "workloads": {"a": {"ratio": 2.0, "band": 0.01, "counts": {"flops": 3}}},
+    "workloads": {"a": {"ratio": 2.0, "band": 0.01, "counts": {"flops": 3}, "experiment": "e"}},
 }
 
 
 def test_is_read_as_it_was_written(tmp_path):
-    made = baseline.Baseline("k", {"jaxlib": "1"}, {"a": baseline.Entry(math.log(2), 0.01, {"flops": 3.0})})
+    made = baseline.Baseline(
+        "k", {"jaxlib": "1"}, {"a": baseline.Entry(math.log(2), 0.01, {"flops": 3.0}, "e")}
+    )
     baseline.write(tmp_path / "b.json", made)
     found = baseline.read(tmp_path / "b.json", "k")
     assert found.entries["a"].log_ratio == pytest.approx(math.log(2), rel=1e-15)
@@ -44,6 +48,28 @@ def test_another_file_is_refused(tmp_path, change, message):
     (tmp_path / "b.json").write_text(json.dumps(GOOD | change))
     with pytest.raises(ConfigError, match=message):
         baseline.read(tmp_path / "b.json", "k")
+
+
+def test_a_baseline_of_another_experiment_of_the_same_name_is_refused(tmp_path):
+    (tmp_path / "b.json").write_text(json.dumps(GOOD))
+    found = baseline.read(tmp_path / "b.json", "k")
+    same, other = (Workload("a", lambda: None, {}, name) for name in ("e", "f"))
+    baseline.refuse_others(tmp_path / "b.json", found, [same])
+    with pytest.raises(ConfigError, match=r"b\.json: was measured on other experiments .*\(a\)"):
+        baseline.refuse_others(tmp_path / "b.json", found, [other])
+
+
+def test_a_gate_without_a_baseline_does_not_pass(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["perf", "--budget", "25%"])
+    assert done.exit_code == 7
+    assert "perf-baseline.json: no baseline to compare with" in done.stderr
+
+
+def test_files_of_one_name_are_refused():
+    named = small_runs.experiment()
+    with pytest.raises(ConfigError, match="several files have the experiment small"):
+        workloads.of_experiments([named, named])
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", "\x00", "[" * 100_000])

@@ -7,6 +7,7 @@ import pytest
 
 from nlbench.perf import baseline, gate, verdict
 from nlbench.perf.counts import risen
+from nlbench.perf.workloads import Workload
 from tests.small_runs import python
 
 MACHINE = {"jaxlib": "1"}
@@ -34,7 +35,7 @@ class Machine:
 def compared(seed, noise, slower, budget=0.25, now=None, before=None, same=True):
     counts = {"a": before or {"flops": 100.0}}
     recorded = gate.measured(Machine(2 * seed, noise), ["a"], gate.RECORDED_BAND)
-    base = baseline.of("k", MACHINE, recorded, counts)
+    base = baseline.of("k", MACHINE, recorded, [Workload("a", lambda: None, counts["a"])])
     machine = Machine(2 * seed + 1, noise, slower)
     (found,) = gate.compared(machine, {"a": now or counts["a"]}, base, budget, same)
     return found
@@ -67,7 +68,7 @@ def test_a_regression_of_one_batch_alone_is_not_reported():
             return super().__call__(names, count)
 
     recorded = gate.measured(Machine(1, 0.01), ["a"], gate.RECORDED_BAND)
-    base = baseline.of("k", MACHINE, recorded, {"a": {}})
+    base = baseline.of("k", MACHINE, recorded, [Workload("a", lambda: None, {})])
     (found,) = gate.compared(Recovering(2, 0.01), {"a": {}}, base, 0.25, True)
     assert found.verdict == "undecided"
 

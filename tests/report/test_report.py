@@ -8,6 +8,9 @@ from urllib.parse import unquote
 import pytest
 
 from nlbench import report
+from nlbench.errors import LockedError
+from nlbench.results.folder import RunFolder
+from nlbench.results.results import Results
 from tests import synthetic_run
 from tests.browser import ABSENT, EXECUTABLE, Browser, Tab
 from tests.parsed_page import Page
@@ -38,6 +41,14 @@ def page(tmp_path_factory):
 def test_the_page_is_in_the_folder_of_the_run(page):
     assert page[0].name == "report.html"
     assert (page[0].parent / "manifest.json").exists()
+
+
+def test_no_report_is_written_while_a_run_writes(page):
+    folder = page[0].parent
+    before = page[0].read_bytes()
+    with RunFolder(folder).locked(), pytest.raises(LockedError, match="is in use by process"):
+        report.write(Results(folder))
+    assert page[0].read_bytes() == before
 
 
 def test_every_element_is_closed(page):

@@ -8,26 +8,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
+from nlbench.report.markdown import plain
 from nlbench.report.tables import Table
 from nlbench.reproduce.page.contents import Contents
 from nlbench.reproduce.page.links import Link
 from nlbench.reproduce.page.overview import Corrected
 from nlbench.reproduce.page.sections import Chapter, Ran, Section, Tested
 
-SPECIAL = re.compile(r"([\\`*_\[\]<>|~$#!&@])")
-LIST = re.compile(
-    r"^(\d+(?=[.)](?:\s|$))|(?=[-+=]))"
-)  # what starts a list or underlines a heading at the start of a line
-
 
 def markdown(contents: Contents) -> str:
     """The whole file."""
     return "\n".join(_lines(contents)).rstrip() + "\n"
-
-
-def plain(text: str) -> str:
-    """Text that Markdown shows as it is, on one line."""
-    return LIST.sub(r"\1\\", SPECIAL.sub(r"\\\1", " ".join(text.split())))
 
 
 def anchor(heading: str) -> str:
