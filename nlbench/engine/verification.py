@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from nlbench.results.results import Results
 
 KEPT = tuple(f"kept_{name}" for name in Reported._fields)
-MAKERS = ("numpy", "pandas")  # of tables from totals; other versions may add in another order
+MAKERS = ("numpy", "scipy", "pandas")  # of tables from totals; other versions may add in another order
 
 
 class Verified(NamedTuple):

@@ -13,7 +13,7 @@ from nlbench.results.atomic import atomic_write
 from nlbench.results.checksum import of_json
 
 SCHEMA = 2
-_PACKAGES = ("nlbench", "jax", "jaxlib", "numpy", "equinox", "diffrax", "pandas", "pyarrow")
+_PACKAGES = ("nlbench", "jax", "jaxlib", "numpy", "scipy", "equinox", "diffrax", "pandas", "pyarrow")
 
 
 def write_manifest(path: Path, facts: dict[str, Any]) -> None:
@@ -29,13 +29,14 @@ def read_manifest(path: Path) -> dict[str, Any]:
         content = json.loads(path.read_bytes())
         checksum = content.pop("checksum")
         schema = content["schema"]
+        found = of_json(content)
     except FileNotFoundError as error:
         raise DamagedResults(
             f"{path} is missing: the run was not finished, or this is not a run's folder"
         ) from error
     except (OSError, ValueError, KeyError, AttributeError, TypeError) as error:
         raise DamagedResults(f"{path}: not a manifest that can be read ({error})") from error
-    if checksum != of_json(content):
+    if checksum != found:
         raise DamagedResults(
             f"{path}: the checksum does not match the content; the file is damaged or edited"
         )
