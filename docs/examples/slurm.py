@@ -32,6 +32,7 @@ def main() -> None:
     )
     with cluster:
         cluster.scale(n=chosen.workers)
+        cluster.wait_for_workers(1)  # the queue may be long; the others are taken as they come
         print(nb.run(chosen.config, chosen.out, dask=cluster.scheduler_address).path)
 
 

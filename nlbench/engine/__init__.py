@@ -31,10 +31,12 @@ def plan(experiment: Any, out: Any = None, precision: str | None = None) -> dict
     precision: such as "rms:1%", which then chooses the runs.
     """
     from nlbench.config.precision import parse
+    from nlbench.engine.memory import memory_faults
     from nlbench.engine.planning.plan import plan
 
     asked = None if precision is None else parse(precision, "precision")
-    return plan(*_stated(experiment), "results" if out is None else out, asked)
+    with memory_faults():
+        return plan(*_stated(experiment), "results" if out is None else out, asked)
 
 
 def check(experiment: Any) -> None:
@@ -46,9 +48,11 @@ def check(experiment: Any) -> None:
 
 def replay(experiment: Any, label: str, trajectory: int) -> Any:
     """One trajectory of one filter in full, as a DataFrame, recomputed with its whole block."""
+    from nlbench.engine.memory import memory_faults
     from nlbench.engine.trace import replay
 
-    return replay(*_stated(experiment), label, trajectory)
+    with memory_faults():
+        return replay(*_stated(experiment), label, trajectory)
 
 
 def verify(results: Any, block: int | None = None) -> Any:

@@ -18,6 +18,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from nlbench.engine import remote
+from nlbench.engine.memory import ran_out
 from nlbench.errors import ConfigError, EnvironmentFault
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ log = logging.getLogger("nlbench")
 def checked(address: str) -> int:
     """How many local processes `address` asks for, 0 for a scheduler. Raises `ConfigError` where that cannot be."""
     local = re.fullmatch(r"local:([1-9][0-9]{0,2})", address)
-    if not local and not re.fullmatch(r"[a-z]+://\S+:[0-9]+", address):
+    if not local and not re.fullmatch(r"(tcp|tls)://\S+:[0-9]+", address):
         raise ConfigError(
             f"--dask: got '{address}'; expected the address of a scheduler, tcp://HOST:PORT, or local:N for N processes"
         )
@@ -75,20 +76,33 @@ def dask_workers(address: str, task: remote.Task) -> Iterator[Dask]:
                     silence_logs=logging.CRITICAL,
                 )
         client = Client(cluster or address, timeout=SECONDS_TO_CONNECT, set_as_default=False)
-    except (OSError, TimeoutError) as error:
+    except Exception as error:  # no answer, other versions, no certificates: each has an error of its own
         if cluster is not None:
             cluster.close()
-        said = " ".join(str(error).split())[:200]
-        raise EnvironmentFault(f"no dask scheduler answers at {address}: {said}") from error
+        raise EnvironmentFault(f"no dask scheduler answers at {address}: {_said(error)}") from error
     workers = Dask(client, task)
     try:
         yield workers
     finally:
         workers.close()
-        with suppress(Exception):  # a cluster that is gone cannot be closed
-            client.close()
-            if cluster is not None:
-                cluster.close()
+        for each in (client, cluster):
+            with suppress(Exception):  # what is gone cannot be closed
+                each.close()
+
+
+def _said(error: Exception) -> str:
+    return " ".join(str(error).split())[:200]
+
+
+def _told(error: Exception) -> Exception:
+    """An error of a worker as the user has to know it: where nlbench is missing or another version there, say, its
+    words are about a module or a file that the user never wrote."""
+    if ran_out(error) or isinstance(error, EnvironmentFault):
+        return error
+    name = type(error).__name__
+    return EnvironmentFault(
+        f"a worker failed: {name}: {_said(error)}; workers need the environment of this machine; {SAVED}"
+    )
 
 
 class Dask:
@@ -146,7 +160,7 @@ class Dask:
         except CancelledError:
             self._fail(promised, EnvironmentFault(f"the dask scheduler is gone; {SAVED}"))
         except Exception as error:
-            self._fail(promised, error)
+            self._fail(promised, _told(error))
         else:
             with self._lock:
                 self._pending.pop(promised, None)

@@ -15,7 +15,6 @@ import numpy as np
 from jax.interpreters.partial_eval import dce_jaxpr
 
 from nlbench.engine.block import followed, make_chunk, trajectories, words
-from nlbench.runtime import threads
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +33,7 @@ ARITHMETIC = frozenset(
 )
 
 
-def cost_table(problem: Problem, seed: int) -> pd.DataFrame:
+def cost_table(problem: Problem, seed: int, threads: int) -> pd.DataFrame:
     """`filter, ns_per_step, compile_seconds, operations_per_step, operations_per_update`.
 
     ns_per_step: one core, updates included, for one trajectory and one integration step; medians of interleaved
@@ -48,7 +47,7 @@ def cost_table(problem: Problem, seed: int) -> pd.DataFrame:
     blocks = max(1, min(MOST_BLOCKS, MOST_STEPS // steps))
     chunk = make_chunk(problem, 0, blocks, blocks, blocks * problem.block)
     data = jax.jit(lambda lanes: jax.lax.map(partial(trajectories, problem, words(seed)), lanes))(chunk.lanes)
-    with ThreadPoolExecutor(threads()) as pool:
+    with ThreadPoolExecutor(threads) as pool:
         programs, compile_seconds = zip(
             *pool.map(partial(_compiled, problem, data), problem.runners), strict=True
         )

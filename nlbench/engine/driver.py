@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,7 @@ from nlbench.engine.memory import Load, memory_faults
 from nlbench.engine.problem import make
 from nlbench.engine.remote import Task
 from nlbench.engine.resume import Saver, finished_runs, numerics, resumed, same_program, sound
-from nlbench.engine.workers import Threads, Workers, in_order
+from nlbench.engine.workers import Threads, Workers, busy, in_order
 from nlbench.errors import ConfigError, Interrupted
 from nlbench.results.folder import RunFolder
 from nlbench.results.results import Results
@@ -70,7 +70,7 @@ def _run(
     if own is not None and compiled:
         # What tells its results from those of another system is the program itself.
         experiment = _identified(experiment, compiled.program)
-    folder = RunFolder(out / experiment.experiment / experiment.hash12())
+    folder = RunFolder(experiment.folder(out))
     with folder.locked():
         done = finished_runs(folder)
         runs = max(experiment.monte_carlo.runs, done or 0)
@@ -84,6 +84,7 @@ def _run(
         compiled = compiled or compile_chunks(problem, experiment.monte_carlo.seed)
         totals = resumed(folder, compiled)
         runs = max(runs, totals.runs)
+        experiment = experiment.of_runs(runs)
         threads = experiment.engine.threads or runtime.threads()
         if check is not None:
             check(compiled, totals, runs, threads, folder.path)
@@ -93,7 +94,7 @@ def _run(
         with _workers(experiment, compiled, runs, threads, dask) as workers:
             totals = compute(compiled, folder, totals, runs, workers, chunk, progress, stopped)
         seconds = time.perf_counter() - begun
-        write(folder, experiment, compiled, totals, seconds, threads, bounds)
+        write(folder, experiment, compiled, totals, seconds, threads, stopped, bounds)
     return Results(folder.path)
 
 
@@ -127,22 +128,26 @@ def compute(
     Whatever ends it early, what was added is saved first; where memory runs out, it goes on with less at a time.
     """
     whole, rest = divmod(runs, compiled.problem.block)
-    saver, load = Saver(folder, compiled, totals), Load(chunk, 2 * workers.at_once)
+    saver, load = Saver(folder, compiled, totals), Load(chunk)
     progress(totals.runs, runs)
     while totals.blocks < whole and not stopped():
         adding = False
         try:
-            for first, sums in in_order(workers, totals.blocks, whole, load.chunk, stopped, load.ahead):
-                adding = True
-                totals.add(first, sums)
-                adding = False
-                progress(totals.runs, runs)
-                saver.now_and_then(totals)
+            parts = in_order(workers, totals.blocks, whole, load.chunk, stopped, load.ahead)
+            with closing(parts):
+                for first, sums in parts:
+                    adding = True
+                    totals.add(first, sums)
+                    adding = False
+                    progress(totals.runs, runs)
+                    saver.now_and_then(totals)
         except Exception as error:
             if adding:  # half a block may have been added
                 totals = resumed(folder, compiled)
+                if totals.share != compiled.share:  # a shard's checkpoint was removed
+                    raise
             saver.save(totals)
-            load = load.halved(error)
+            load = load.halved(error, busy(workers))
     saver.save(totals)
     if stopped():
         raise Interrupted(

@@ -26,7 +26,7 @@ experiment = config.from_dict({
     "filters": ["third-order"],
     "time": {"end": 10.0, "step": 0.02, "output": 10.0},
 })
-print(cost_table(make(experiment), seed=1).ns_per_step[0])
+print(cost_table(make(experiment), seed=1, threads=1).ns_per_step[0])
 """
 
 

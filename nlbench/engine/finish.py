@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import datetime
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from nlbench.engine.compiled import Compiled
 from nlbench.engine.cost import cost_table
 from nlbench.engine.resume import device, numerics
 from nlbench.engine.trace import trace_tables
+from nlbench.errors import Interrupted
 from nlbench.results.atomic import remove
 from nlbench.results.folder import TABLES, RunFolder
 from nlbench.results.manifest import commit, versions
@@ -50,7 +52,8 @@ def read_anew(folder: RunFolder, experiment: Experiment) -> None:
     folder.write_experiment(experiment.resolved_yaml())
     _remove(folder, "claims", "sets")
     folder.write_tables(_judged(experiment, made, clip, facts["norms"]))
-    folder.finish(results.manifest["runs"], **facts)
+    stay = [name for name in results.manifest["checksums"] if name.startswith(f"{TABLES}/")]
+    folder.finish(results.manifest["runs"], stay, **facts)
 
 
 def _judged(
@@ -79,6 +82,13 @@ def of_totals(problem: Problem, totals: Totals) -> dict[str, pd.DataFrame]:
     return made
 
 
+def _go_on(stopped: Callable[[], bool]) -> None:
+    if stopped():
+        raise Interrupted(
+            "stopped before the tables were written; all runs are saved, and the same command goes on from there"
+        )
+
+
 def write(
     folder: RunFolder,
     experiment: Experiment,
@@ -86,9 +96,13 @@ def write(
     totals: Totals,
     seconds: float,
     threads: int,
+    stopped: Callable[[], bool],
     bounds: pd.DataFrame | None = None,
 ) -> None:
-    """Write everything that a finished run leaves, the mark that it is done last."""
+    """Write everything that a finished run leaves, the mark that it is done last.
+
+    Raises `Interrupted` before a part that takes long where the run is to stop; all its runs are saved by now.
+    """
     problem = compiled.problem
     made = of_totals(problem, totals)
     if bounds is not None:
@@ -98,9 +112,12 @@ def write(
     norms = {name: [layout.coordinates[i] for i in members] for name, members in layout.norms.items()}
     made |= _judged(experiment, made, clip, norms)
     if experiment.traces:
+        _go_on(stopped)
         made |= trace_tables(compiled, experiment.traces, threads)
     if experiment.engine.cost:
-        made["cost"] = cost_table(problem, experiment.monte_carlo.seed)
+        _go_on(stopped)
+        made["cost"] = cost_table(problem, experiment.monte_carlo.seed, threads)
+    _go_on(stopped)
     _remove(folder, "traces", "responses", "claims", "sets", "cost")
     folder.write_tables(made)
     folder.finish(

@@ -18,16 +18,20 @@ log = logging.getLogger("nlbench")
 
 
 class Load(NamedTuple):
-    """How many blocks a call has at most, and how many calls are under way or wait to be taken."""
+    """How many blocks a call has at most, and how many calls are under way or wait to be taken; None: as many as keep
+    all workers busy."""
 
     chunk: int
-    ahead: int
+    ahead: int | None = None
 
-    def halved(self, error: Exception) -> Load:
-        """Half of both, after `error`, which is raised again where it is another or there is nothing left to halve."""
+    def halved(self, error: Exception, busy: int) -> Load:
+        """Half of both, after `error`, which is raised again where it is another or there is nothing left to halve.
+
+        busy: calls that keep all workers busy.
+        """
         if not ran_out(error) or self == (1, 1):
             raise error
-        less = Load(max(1, self.chunk // 2), max(1, self.ahead // 2))
+        less = Load(max(1, self.chunk // 2), max(1, (self.ahead or busy) // 2))
         log.warning(
             "out of memory; going on with at most %d blocks a call and %d calls at a time, which changes no digit",
             *less,
@@ -54,5 +58,10 @@ def memory_faults() -> Iterator[None]:
     except Exception as error:
         if not ran_out(error):
             raise
-        said = " ".join(str(error).removeprefix("RESOURCE_EXHAUSTED:").split())[:200]
-        raise EnvironmentFault(f"out of memory{f': {said}' if said else ''}. {ADVICE}") from error
+        raise fault(error) from error
+
+
+def fault(error: BaseException) -> EnvironmentFault:
+    """What to say of an error that says that memory ran out."""
+    said = " ".join(str(error).removeprefix("RESOURCE_EXHAUSTED:").split())[:200]
+    return EnvironmentFault(f"out of memory{f': {said}' if said else ''}. {ADVICE}")

@@ -26,13 +26,31 @@ log = logging.getLogger("nlbench")
 def use_cache() -> None:
     """Keep compiled programs on disk, in $NLBENCH_CACHE or the user's cache folder."""
     LRUCache.put, LRUCache.get = _put, _get  # type: ignore[assignment, method-assign]
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = os.environ.get("NLBENCH_CACHE") or Path(base) / "nlbench" / "xla"
+    folder = _folder()
+    if folder is None:
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        log.warning("%s: compiled programs are not kept (%s)", folder, error.strerror)
+        return
     if jax.config.jax_compilation_cache_dir != str(folder):  # type: ignore[attr-defined]
         jax.config.update("jax_compilation_cache_dir", str(folder))
         compilation_cache.reset_cache()  # jax stays with the folder of its first compilation
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
+
+
+def _folder() -> Path | None:
+    """Where programs are kept; None for a user without a home."""
+    if given := os.environ.get("NLBENCH_CACHE"):
+        return Path(given)
+    try:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    except RuntimeError:
+        log.warning("no folder for compiled programs: set NLBENCH_CACHE, or each run compiles anew")
+        return None
+    return base / "nlbench" / "xla"
 
 
 def _put(cache: LRUCache, key: str, value: bytes) -> None:

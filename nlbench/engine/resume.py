@@ -16,6 +16,7 @@ from nlbench.results.results import Results
 from nlbench.statistics.totals import Totals
 
 SECONDS_BETWEEN_CHECKPOINTS = 5.0
+UNSAID = 2  # schema of checkpoints that do not say theirs
 CHECKPOINT_SHARE = 30  # ... or more, so that writing large ones takes a thirtieth of the time
 log = logging.getLogger("nlbench")
 
@@ -47,24 +48,32 @@ def sound(folder: RunFolder) -> bool:
 def resumed(folder: RunFolder, compiled: Compiled) -> Totals:
     """Totals of the checkpoint, or fresh ones. Raises `EnvironmentFault` if other software made the checkpoint."""
     try:
-        saved = folder.load_checkpoint()
+        saved = loaded(folder, compiled, "choose another folder with --out, or delete that one")
     except DamagedResults as fault:
         log.warning("%s; the run starts again", fault)
         saved = None
+    return Totals(compiled.problem.layout) if saved is None else saved
+
+
+def loaded(folder: RunFolder, compiled: Compiled, advice: str) -> Totals | None:
+    """Totals of the checkpoint, None where there is none.
+
+    Raises `DamagedResults`, and `EnvironmentFault`, with the advice, if other software made it.
+    """
+    saved = folder.load_checkpoint()
     if saved is None:
-        return Totals(compiled.problem.layout)
+        return None
     arrays, facts = saved
-    # Checkpoints did not say their schema before there was a third one.
-    if facts.get("schema", SCHEMA) != SCHEMA:
+    schema = facts.get("schema", UNSAID)
+    if schema != SCHEMA:
         raise EnvironmentFault(
-            f"{folder.path / CHECKPOINT}: schema {facts['schema']}, this version of nlbench writes schema {SCHEMA}: "
-            "choose another folder with --out, or delete that one"
+            f"{folder.path / CHECKPOINT}: schema {schema}, this version of nlbench writes schema {SCHEMA}: {advice}"
         )
     changed = differences(numerics(compiled), facts["fingerprint"])
     if changed:
         raise EnvironmentFault(
             f"{folder.path} was computed with other software or hardware ({'; '.join(changed)}), and mixing them "
-            "would change digits: choose another folder with --out, or delete that one"
+            f"would change digits: {advice}"
         )
     return Totals.from_state(compiled.problem.layout, arrays)
 

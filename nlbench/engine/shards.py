@@ -7,6 +7,7 @@ block included, is what `run` does with a checkpoint.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -17,12 +18,12 @@ from nlbench.engine.compiled import CAPACITY, Compiled, compile_chunks
 from nlbench.engine.interruption import stop_requests
 from nlbench.engine.memory import memory_faults
 from nlbench.engine.problem import make
-from nlbench.engine.resume import numerics, resumed, save
+from nlbench.engine.resume import loaded, resumed, save
 from nlbench.engine.workers import Threads
 from nlbench.errors import ConfigError, EnvironmentFault
-from nlbench.results.fingerprint import differences
-from nlbench.results.folder import RunFolder
+from nlbench.results.folder import CHECKPOINT, RunFolder
 from nlbench.statistics.joined import joined
+from nlbench.statistics.layout import GROUPS
 from nlbench.statistics.share import Share
 from nlbench.statistics.totals import Totals
 
@@ -36,6 +37,7 @@ SHARDS = "shards"
 class Done(NamedTuple):
     """What a shard has: its folder, and how many runs of how many that the experiment asks for in all."""
 
+    share: Share
     folder: Path
     runs: int
     total: int
@@ -47,21 +49,27 @@ def run_shard(
     of: int,
     out: str | Path,
     progress: Callable[[int, int], None] | None = None,
+    check: driver.Check | None = None,
 ) -> Done:
-    """Compute what is missing of shard `number` (from 1) and keep its totals. Raises what `run` raises."""
+    """Compute what is missing of shard `number` (from 1) and keep its totals. Raises what `run` raises.
+
+    check: may raise before anything is computed.
+    """
     share = Share(number - 1, of)
     runs, block = experiment.monte_carlo.runs, experiment.engine.block
     with stop_requests() as stopped, memory_faults():
         compiled = compile_chunks(make(experiment), experiment.monte_carlo.seed)
-        folder = RunFolder(_home(experiment, out) / _name(share))
+        folder = RunFolder(experiment.folder(out) / _name(share))
         with folder.locked():
-            folder.write_experiment(experiment.resolved_yaml())
             totals = resumed(folder, compiled)
+            threads = experiment.engine.threads or runtime.threads()
+            mine = max(totals.blocks, share.count(runs // block)) * block
+            if check is not None:
+                check(compiled, totals, mine, threads, folder.path)
+            folder.write_experiment(experiment.resolved_yaml())
             if totals.blocks == 0:
                 totals = _begun(compiled, share, runs)
                 save(folder, compiled, totals)
-            threads = experiment.engine.threads or runtime.threads()
-            mine = max(totals.blocks, share.count(runs // block)) * block
             dealt = compiled._replace(share=share)
             with Threads(dealt, runs=_end(share, mine // block) * block, threads=threads) as workers:
                 totals = driver.compute(
@@ -74,7 +82,7 @@ def run_shard(
                     progress or (lambda done, total: None),
                     stopped,
                 )
-    return Done(folder.path, totals.runs, runs)
+    return Done(share, folder.path, totals.runs, runs)
 
 
 def _begun(compiled: Compiled, share: Share, runs: int) -> Totals:
@@ -97,6 +105,13 @@ def merge(
     Raises `ConfigError` where a shard is missing, incomplete or there twice, `DamagedResults` where one is damaged, and
     `EnvironmentFault` where one was computed with other software or hardware.
     """
+    with memory_faults():
+        _join(experiment, sources, out)
+    return driver.run(experiment, None, out, progress)
+
+
+def _join(experiment: Experiment, sources: Sequence[str | Path], out: str | Path) -> None:
+    """Make the checkpoint of the run from those of all shards."""
     block = experiment.engine.block
     found = _found(experiment, sources)
     compiled = compile_chunks(make(experiment), experiment.monte_carlo.seed)
@@ -117,36 +132,33 @@ def merge(
         totals = joined(compiled.problem.layout, list(parts.values()), block)
     except ValueError as fault:
         raise EnvironmentFault(f"{', '.join(map(str, found.values()))}: {fault}") from fault
-    folder = RunFolder(_home(experiment, out))
+    folder = RunFolder(experiment.folder(out))
     with folder.locked():
         if resumed(folder, compiled).blocks < totals.blocks:
             folder.reopen()
             save(folder, compiled, totals)
-    return driver.run(experiment, None, out, progress)
 
 
 def _loaded(path: Path, compiled: Compiled) -> Totals:
     """Totals of a shard that fit the program here."""
-    saved = RunFolder(path).load_checkpoint()
-    assert saved is not None
-    arrays, facts = saved
-    changed = differences(numerics(compiled), facts["fingerprint"])
-    if changed:
-        raise EnvironmentFault(
-            f"{path} was computed with other software or hardware ({'; '.join(changed)}); mixing them would change "
-            "digits: merge where all is as it was there, and compute all shards on machines of one kind"
-        )
-    return Totals.from_state(compiled.problem.layout, arrays)
+    totals = loaded(
+        RunFolder(path),
+        compiled,
+        "merge where all is as it was there, and compute all shards on machines of one kind",
+    )
+    if totals is None:
+        raise ConfigError(f"{path}: the shard's checkpoint was removed; give its command again")
+    return totals
 
 
 def _found(experiment: Experiment, sources: Sequence[str | Path]) -> dict[Share, Path]:
     """The folder of each shard of one division. Raises `ConfigError` naming those that are missing or there twice."""
     places: dict[Share, list[Path]] = {}
-    homes = dict.fromkeys(_home(experiment, source).resolve() for source in sources)
+    homes = dict.fromkeys(experiment.folder(source).resolve() for source in sources)
     for home in homes:
-        for path in sorted((home / SHARDS).glob("*-of-*/batches/checkpoint.npz")):
-            number, _, of = path.parents[1].name.partition("-of-")
-            places.setdefault(Share(int(number) - 1, int(of)), []).append(path.parents[1])
+        for path in sorted((home / SHARDS).glob(f"*/{CHECKPOINT}")):
+            if share := _share(path.parents[1].name):
+                places.setdefault(share, []).append(path.parents[1])
     if not places:
         raise ConfigError(
             f"no shards of this experiment in {', '.join(str(home / SHARDS) for home in homes)}: give the --out "
@@ -166,12 +178,16 @@ def _found(experiment: Experiment, sources: Sequence[str | Path]) -> dict[Share,
     return {share: places[share][0] for share in sorted(places)}
 
 
-def _home(experiment: Experiment, out: str | Path) -> Path:
-    return Path(out) / experiment.experiment / experiment.hash12()
-
-
 def _name(share: Share) -> str:
     return f"{SHARDS}/{share.number + 1}-of-{share.of}"
+
+
+def _share(name: str) -> Share | None:
+    """The share whose folder has this name; None for another folder."""
+    given = re.fullmatch(r"([0-9]{1,2})-of-([0-9]{1,2})", name)
+    if given is None or not 1 <= int(given[1]) <= int(given[2]) <= GROUPS:
+        return None
+    return Share(int(given[1]) - 1, int(given[2]))
 
 
 def _end(share: Share, count: int) -> int:

@@ -41,7 +41,10 @@ def replay(
 
     known(label, experiment.labels, what="filter")
     if not 0 <= trajectory < experiment.monte_carlo.runs:
-        raise ConfigError(f"trajectory {trajectory} is not one of 0 ... {experiment.monte_carlo.runs - 1}")
+        most = experiment.monte_carlo.runs - 1
+        raise ConfigError(
+            f"trajectory {trajectory} is not one of 0 ... {most}, as many as monte_carlo.runs says"
+        )
     problem = make(experiment, own)
     view = compile_chunks(problem, experiment.monte_carlo.seed).view(trajectory)
     number = experiment.labels.index(label)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from queue import SimpleQueue
 from types import TracebackType
@@ -30,7 +30,7 @@ class Part(NamedTuple):
 
 @runtime_checkable
 class Workers(Protocol):
-    """Several calls at a time; `at_once` says how many make all of them busy."""
+    """Several calls at a time; `at_once` says how many make all of them busy, which may change."""
 
     at_once: int
 
@@ -85,21 +85,20 @@ def in_order(
     chunk: int,
     stopped: Callable[[], bool],
     ahead: int | None = None,
-) -> Iterator[tuple[int, dict[str, Any]]]:
+) -> Generator[tuple[int, dict[str, Any]], None, None]:
     """Sums of blocks first ... last - 1 in order, computed by workers that run ahead; ends early when stopped.
 
     A call takes as many blocks as take about `SECONDS_OF_A_CALL`, so that a run stops soon after it is asked to.
-    ahead: calls that are under way or wait to be taken, twice `at_once` unless said. When a call fails, its error is
-    raised once no other is under way: their memory is free again.
+    ahead: calls that are under way or wait to be taken, twice `at_once` unless said. When a call fails, or who takes
+    the sums does, the error is raised once no call is under way: their memory is free again.
     """
-    ahead = ahead or 2 * workers.at_once
-    most = min(chunk, CAPACITY, max(1, -(-(last - first) // (4 * workers.at_once))))
     start, size = first, 1
     pending: deque[tuple[int, int, Future[Part]]] = deque()
     try:
         while True:
-            while len(pending) < ahead and not stopped() and start < last:
-                count = min(size, last - start)
+            while len(pending) < (ahead or busy(workers)) and not stopped() and start < last:
+                most = min(chunk, CAPACITY, max(1, -(-(last - first) // (4 * workers.at_once))))
+                count = min(size, most, last - start)
                 pending.append((start, count, workers.submit(start, count)))
                 start += count
             if not pending:
@@ -107,9 +106,14 @@ def in_order(
             begin, count, future = pending.popleft()
             sums, seconds = future.result()
             del future  # it holds the sums
-            size = max(1, min(most, int(count * SECONDS_OF_A_CALL / max(seconds, 1e-9))))
+            size = max(1, int(count * SECONDS_OF_A_CALL / max(seconds, 1e-9)))
             yield begin, sums
             del sums
-    except Exception:
+    except (Exception, GeneratorExit):
         wait([each for *_, each in pending if not each.cancel()])
         raise
+
+
+def busy(workers: Workers) -> int:
+    """How many calls, under way or waiting to be taken, keep all workers busy."""
+    return 2 * workers.at_once

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -39,7 +38,9 @@ def load_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         if error.errno is None:  # raised by NumPy about the content
             raise DamagedResults(f"{path}: not a checkpoint that can be read ({error})") from error
         raise EnvironmentFault(f"{path}: cannot be read ({error.strerror})") from error
-    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError) as error:
+    except MemoryError:
+        raise
+    except Exception as error:  # each part of an archive that can be wrong has an error of its own
         raise DamagedResults(f"{path}: not a checkpoint that can be read ({error})") from error
     if checksum != of_arrays(content):
         raise DamagedResults(f"{path}: the checksum does not match the content; the file is damaged")

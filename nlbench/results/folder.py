@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,17 +87,19 @@ class RunFolder:
             written = write_table(self.path / TABLES, name, table)
             self._written |= {f"{TABLES}/{file}": checksum for file, checksum in written.items()}
 
-    def finish(self, runs: int, **facts: Any) -> None:
-        """Write the manifest, with checksums of what the folder holds, and the mark that `runs` are done.
+    def finish(self, runs: int, tables: Iterable[str] = (), **facts: Any) -> None:
+        """Write the manifest, with checksums of the run's files, and the mark that `runs` are done.
 
-        Raises `EnvironmentFault` where a table is not as it was written a moment ago.
+        tables: files of tables that were there before and stay, as the manifest names them. Raises `EnvironmentFault`
+        where a table is not as it was written a moment ago.
         """
         from nlbench.results.manifest import write_manifest
 
         self._check()
+        names = [EXPERIMENT, CHECKPOINT, *sorted({*self._written, *tables})]
         try:
-            kept = [self.path / EXPERIMENT, self.path / CHECKPOINT, *sorted((self.path / TABLES).iterdir())]
-            checksums = {str(p.relative_to(self.path)): of_bytes(p.read_bytes()) for p in kept if p.exists()}
+            there = [name for name in names if (self.path / name).exists()]
+            checksums = {name: of_bytes((self.path / name).read_bytes()) for name in there}
         except OSError as error:
             raise EnvironmentFault(f"{error.filename}: cannot be read ({error.strerror})") from error
         for name, checksum in self._written.items():

@@ -111,7 +111,9 @@ def test_xla_gets_as_many_threads_as_the_worker_has(monkeypatch):
     assert os.environ["PJRT_NPROC"] == "3"
 
 
-@pytest.mark.parametrize("address", ["local", "local:0", "local:x", "somewhere", "tcp://host"])
+@pytest.mark.parametrize(
+    "address", ["local", "local:0", "local:x", "somewhere", "tcp://host", "http://host:8787"]
+)
 def test_an_address_that_is_none_is_a_mistake_of_usage(address):
     done = CliRunner().invoke(app, ["run", "configs/quickstart.yaml", "--dask", address])
     assert done.exit_code == 2
@@ -156,10 +158,32 @@ def test_blocks_that_killed_workers_are_sent_again_but_not_for_ever(workers):
     assert sender._client.sent == 1 + cluster.MOST_DEATHS
 
 
-def test_an_error_of_a_worker_is_the_error_of_the_run(workers):
+@pytest.mark.parametrize("error", [MemoryError("no room"), EnvironmentFault("other software")])
+def test_an_error_of_a_worker_is_the_error_of_the_run(workers, error):
     pytest.importorskip("distributed")
-    with pytest.raises(MemoryError):
-        workers(MemoryError()).submit(0, 1).result(20)
+    with pytest.raises(type(error), match=str(error)):
+        workers(error).submit(0, 1).result(20)
+
+
+@pytest.mark.parametrize(
+    "error", [ModuleNotFoundError("No module named 'nlbench'"), ConfigError("no such key")]
+)
+def test_a_worker_with_another_environment_is_a_fault_of_it(workers, error):
+    pytest.importorskip("distributed")
+    with pytest.raises(
+        EnvironmentFault, match=rf"a worker failed: {type(error).__name__}: {error}; workers need"
+    ):
+        workers(error).submit(0, 1).result(20)
+
+
+def test_a_scheduler_that_needs_certificates_is_an_error_in_a_line(task):
+    pytest.importorskip("distributed")
+    connected = cluster.dask_workers("tls://127.0.0.1:9", task)
+    with (
+        pytest.raises(EnvironmentFault, match=r"no dask scheduler answers at tls://127.0.0.1:9: ."),
+        connected,
+    ):
+        pass
 
 
 class KillOneWorker:

@@ -9,10 +9,13 @@ import pytest
 from typer.testing import CliRunner
 
 import nlbench as nb
+from nlbench.cli import budget
 from nlbench.cli.app import app
+from nlbench.engine.planning import space
 from nlbench.engine.shards import merge, run_shard
 from nlbench.errors import ConfigError, DamagedResults, EnvironmentFault, Interrupted, LockedError
 from nlbench.results.folder import RunFolder
+from tests.example import spoiled, written
 from tests.small_runs import experiment, table_bytes
 
 RUNS = 3010  # 47 blocks and 2 runs; 2,048 are kept
@@ -95,6 +98,36 @@ def test_shards_of_another_division_are_refused(copied, tmp_path):
     shutil.copytree(shard_folder(copied[1], 2), shard_folder(copied[0], 1).parent / "2-of-4")
     with pytest.raises(ConfigError, match="several divisions"):
         merge(small(), copied, tmp_path / "merged")
+
+
+def test_folders_with_other_names_are_no_shards(copied, one_machine, tmp_path):
+    first = shard_folder(copied[0], 1)
+    for name in ("1-of-3-old", "9-of-3", "0-of-3", "1-of-65", "copy"):
+        shutil.copytree(first, first.parent / name)
+    assert table_bytes(merge(small(), copied, tmp_path / "merged").path) == one_machine
+
+
+def test_a_shard_of_another_schema_is_refused(copied, tmp_path):
+    folder = RunFolder(shard_folder(copied[1], 2))
+    arrays, facts = folder.load_checkpoint()
+    folder.save_checkpoint(arrays, **{**facts, "schema": 1})
+    with pytest.raises(EnvironmentFault, match=r"2-of-3.*schema 1, this version"):
+        merge(small(), copied, tmp_path / "merged")
+
+
+def test_a_shard_keeps_to_the_budget_and_to_what_is_free(tmp_path, monkeypatch):
+    monkeypatch.setattr(space.atomic, "free_disk", lambda folder: 1000)
+    file = written(tmp_path, spoiled("experiment: culver/hermite-01", "experiment: shard"))
+    words = ["run", str(file), "--shard", "1/3", "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 5
+    assert "not begun, disk of" in done.stderr
+    assert not list(tmp_path.rglob("checkpoint.npz"))
+    monkeypatch.undo()
+    monkeypatch.setattr(budget, "SETTLED", 0.0)
+    done = CliRunner().invoke(app, [*words, "--runs", "1e12", "--budget", "1s"])
+    assert done.exit_code == 2
+    assert "the budget is 1.0 s" in done.stderr
 
 
 def test_shards_of_another_experiment_are_not_taken(sharded, tmp_path):

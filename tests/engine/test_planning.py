@@ -11,7 +11,7 @@ import pytest
 import nlbench as nb
 from nlbench import engine, report, schedule
 from nlbench.engine.compiled import compile_chunks
-from nlbench.engine.planning import calibration, durations, plan, sizes, space
+from nlbench.engine.planning import calibration, durations, machine, plan, sizes, space
 from nlbench.engine.planning.compilation import LOADING, listening
 from nlbench.engine.planning.memory import memory
 from nlbench.engine.problem import make
@@ -197,6 +197,26 @@ def test_a_refused_run_writes_nothing(tmp_path, monkeypatch):
     with pytest.raises(EnvironmentFault):
         nb.run(small(), tmp_path, check=space.require)
     assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.name != ".lock"]
+
+
+def test_memory_of_a_control_group_is_what_its_limits_leave(tmp_path, monkeypatch):
+    """Of the innermost group with a limit and of those around it; files kept in memory are given up when needed."""
+    inside = tmp_path / "slurm" / "job" / "step"
+    for path, limit, used, files in (
+        (inside, "max", 5, 0),
+        (inside.parent, "1000", 900, 500),
+        (inside.parents[1], "5000", 100, 0),
+    ):
+        path.mkdir(parents=True, exist_ok=True)
+        (path / "memory.max").write_text(f"{limit}\n")
+        (path / "memory.current").write_text(f"{used}\n")
+        (path / "memory.stat").write_text(f"anon 1\ninactive_file {files}\n")
+    (tmp_path / "groups").write_text("0::/slurm/job/step\n")
+    monkeypatch.setattr(machine, "CGROUP", tmp_path)
+    monkeypatch.setattr(machine, "GROUPS", tmp_path / "groups")
+    assert machine.free_memory() == 600
+    (inside.parent / "memory.max").write_text("max\n")
+    assert machine.free_memory() == 4900
 
 
 def test_what_fits_is_not_refused(compiled, tmp_path):

@@ -34,7 +34,7 @@ def made_quick(patch: pytest.MonkeyPatch, program: Compiled) -> None:
     """Have runs of `small()` take the program given, and say that filters cost nothing."""
     patch.setattr(driver, "make", lambda experiment, own: program.problem)
     patch.setattr(driver, "compile_chunks", lambda problem, seed: program)
-    patch.setattr(finish, "cost_table", lambda problem, seed: pd.DataFrame({"filter": ["any"]}))
+    patch.setattr(finish, "cost_table", lambda *given: pd.DataFrame({"filter": ["any"]}))
 
 
 class FailingDisk:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 
 import pytest
 
@@ -13,6 +14,7 @@ from nlbench.results.results import Results
 from tests.faults.quick import small
 from tests.small_runs import table_bytes
 
+CLAIM = {"id": "C1", "says": "none is lost", "statistic": "diverged", "of": ["third-order"], "below": 0.5}
 pytestmark = pytest.mark.usefixtures("quick")
 
 
@@ -37,3 +39,34 @@ def test_a_checkpoint_of_another_schema_is_named_and_stays(tmp_path):
     ):
         nb.run(small(monte_carlo={"runs": 2000, "seed": 11}), tmp_path)
     assert (folder.path / "batches" / "checkpoint.npz").read_bytes() == before
+
+
+def test_a_number_that_json_does_not_have_is_damage(undisturbed, tmp_path, caplog):
+    path = nb.run(small(), tmp_path).path
+    manifest = path / "manifest.json"
+    manifest.write_text(re.sub('"seconds": [0-9.]+', '"seconds": NaN', manifest.read_text()))
+    assert "not a manifest that can be read" in Results(path).damaged()[0]
+    again = nb.run(small(), tmp_path)
+    assert table_bytes(again.path) == table_bytes(undisturbed)
+
+
+def test_what_others_put_among_the_tables_is_neither_read_nor_in_the_way(undisturbed, tmp_path):
+    tables = RunFolder(nb.run(small(), tmp_path).path).path / "tables"
+    (tables / ".ipynb_checkpoints").mkdir()
+    (tables / "mine.parquet").write_bytes((tables / "statistics.parquet").read_bytes())
+    (tables.parent / "DONE").unlink()
+    again = nb.run(small(), tmp_path)
+    assert "mine" not in again.tables
+    assert again.damaged() == []
+    assert [each for each in again.unknown() if "mine.parquet" in each]
+    claimed = nb.run(small(claims=[CLAIM]), tmp_path)  # read anew, nothing computed
+    assert "claims" in claimed.tables
+    assert "mine" not in claimed.tables
+    assert claimed.damaged() == []
+
+
+def test_fewer_runs_than_there_are_change_nothing_and_are_not_claimed(tmp_path):
+    path = nb.run(small(), tmp_path).path
+    (path / "tables" / "paired.csv").write_text("edited")
+    again = nb.run(small(monte_carlo={"runs": 100, "seed": 11}), tmp_path)
+    assert again.manifest["runs"] == again.experiment.monte_carlo.runs == 1000

@@ -66,7 +66,7 @@ def test_another_run_that_began_there_meanwhile_is_left_alone(undisturbed, tmp_p
 
 
 def test_among_the_tables_it_is_named_and_the_same_command_starts_again(undisturbed, tmp_path, monkeypatch):
-    def removed(problem, seed):
+    def removed(*given):
         shutil.rmtree(tmp_path / "small")
         return pd.DataFrame({"filter": ["any"]})
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 
+import pytest
 from jax._src.lru_cache import LRUCache
 
 from nlbench.engine.program_cache import _get, _put
@@ -45,6 +46,31 @@ def test_a_damaged_one_is_removed_and_said(tmp_path, caplog):
             assert _get(cache, "key") is None
         assert str(path) in caplog.text
         assert not path.exists()
+
+
+@pytest.mark.parametrize(
+    ("home", "said"),
+    [
+        (None, "no folder for compiled programs: set NLBENCH_CACHE"),
+        ("/dev/null", "compiled programs are not kept"),
+    ],
+)
+def test_where_nothing_can_be_kept_that_is_said_and_no_more(home, said):
+    line = f"""
+import os, pathlib
+home = {home!r}
+for name in ("NLBENCH_CACHE", "XDG_CACHE_HOME"):
+    os.environ.pop(name, None)
+def of_nobody():
+    if home is None:
+        raise RuntimeError("Could not determine home directory.")
+    return pathlib.Path(home)
+pathlib.Path.home = of_nobody
+"""
+    done = python(line + COMPILE)
+    assert done.returncode == 0, done.stderr
+    assert said in done.stderr
+    assert len(done.stderr.splitlines()) == 1
 
 
 def test_jax_keeps_its_programs_this_way_and_compiles_damaged_ones_anew(tmp_path, monkeypatch):

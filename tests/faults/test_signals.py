@@ -12,6 +12,11 @@ from pathlib import Path
 
 import pytest
 
+import nlbench as nb
+from nlbench.engine import finish
+from nlbench.engine.interruption import stop_requests
+from nlbench.errors import Interrupted
+from tests.faults.quick import small
 from tests.small_runs import python
 
 # One long call that releases the lock of the interpreter, as a compilation is.
@@ -39,6 +44,34 @@ def test_a_second_signal_ends_a_call_that_python_cannot_interrupt(numbers):
         _, said = process.communicate(timeout=30)
     assert process.returncode == 130
     assert said.endswith("interrupted; the same command goes on from what was saved\n"), said
+
+
+def test_a_signal_that_is_ignored_stays_so():
+    """As SIGINT is in the background jobs of a script, which then are stopped by SIGTERM."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with stop_requests() as stopped:
+            signal.raise_signal(signal.SIGINT)
+            assert not stopped()
+            signal.raise_signal(signal.SIGTERM)
+            assert stopped()
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.parametrize("stage", ["trace_tables", "cost_table"])
+def test_a_signal_after_the_last_block_stops_before_what_takes_long(tmp_path, monkeypatch, quick, stage):
+    def signalled(*given):
+        signal.raise_signal(signal.SIGTERM)
+        return {} if stage == "trace_tables" else None
+
+    monkeypatch.setattr(finish, stage, signalled)
+    asked = small(traces=[3], engine={"chunk": 1, "threads": 2, "cost": True})
+    with pytest.raises(Interrupted, match="all runs are saved"):
+        nb.run(asked, tmp_path)
+    assert not list(tmp_path.rglob("DONE"))
+    monkeypatch.undo()
 
 
 def test_one_signal_does_not():

@@ -37,7 +37,8 @@ def folder(undisturbed, tmp_path):
 def rewritten(folder, **changes):
     """A manifest that fits what lies in the folder now: what a careful forger leaves."""
     facts = {key: value for key, value in read_manifest(folder / MANIFEST).items() if key not in OWN_FACTS}
-    RunFolder(folder).finish(1000, **{**facts, **changes})
+    tables = [f"tables/{path.name}" for path in (folder / "tables").iterdir()]
+    RunFolder(folder).finish(1000, tables, **{**facts, **changes})
 
 
 def bytes_of(folder):

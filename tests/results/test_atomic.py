@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -25,6 +26,19 @@ def test_writes_and_replaces_and_leaves_nothing_beside(tmp_path):
     atomic_write(path, b"second")
     assert path.read_bytes() == b"second"
     assert names(path.parent) == ["table.csv"]
+
+
+def test_folders_that_cannot_be_synced_are_no_fault(tmp_path, monkeypatch):
+    fsync = os.fsync
+
+    def only_files(descriptor):
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, "Invalid argument")
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", only_files)
+    atomic_write(tmp_path / "table.csv", b"new")
+    assert (tmp_path / "table.csv").read_bytes() == b"new"
 
 
 @pytest.mark.parametrize("step", ["write", "fsync", "replace"])

@@ -58,6 +58,21 @@ def test_one_flipped_bit_anywhere_in_the_content_is_noticed(path):
     assert noticed > 0.8 * len(positions)
 
 
+@pytest.mark.parametrize("bit", range(8))
+def test_a_flipped_bit_in_the_table_of_contents_is_damage_or_nothing(path, bit):
+    data = path.read_bytes()
+    start = data.index(b"PK\x01\x02")
+    for position in range(
+        start, start + 46
+    ):  # flags, which may say that it is encrypted; method; sizes; checksums
+        path.write_bytes(data[:position] + bytes([data[position] ^ 1 << bit]) + data[position + 1 :])
+        try:
+            _, facts = load_checkpoint(path)
+        except DamagedResults:
+            continue
+        assert facts == FACTS
+
+
 @pytest.mark.parametrize("keep", [0, 10, 0.5, 0.99])
 def test_a_truncated_file_is_damaged(path, keep):
     data = path.read_bytes()

@@ -11,6 +11,7 @@ from nlbench import runtime
 from nlbench.engine import cost
 from nlbench.engine.bounds import bounds_table
 from nlbench.engine.compiled import compile_chunks
+from nlbench.engine.finish import of_totals
 from nlbench.engine.planning import machine, sizes
 from nlbench.engine.planning.calibration import calibrate, extend
 from nlbench.engine.planning.compilation import listening
@@ -21,8 +22,6 @@ from nlbench.engine.problem import make
 from nlbench.engine.resume import finished_runs, resumed
 from nlbench.results import atomic
 from nlbench.results.folder import RunFolder
-from nlbench.statistics.consistency import consistency_table
-from nlbench.statistics.summary import tables
 from nlbench.statistics.totals import Totals
 
 if TYPE_CHECKING:
@@ -66,7 +65,7 @@ def plan(
         compiled, seconds = _timed(lambda: compile_chunks(problem, experiment.monte_carlo.seed))
     after = machine.resident()
     threads = experiment.engine.threads or runtime.threads()
-    folder = RunFolder(Path(out) / experiment.experiment / experiment.hash12()) if own is None else None
+    folder = RunFolder(experiment.folder(out)) if own is None else None
     saved = resumed(folder, compiled) if folder and folder.path.is_dir() else None
     calibration = calibrate(compiled, threads)
     chosen = _chosen(precision, compiled, saved, calibration.totals, threads) if precision else None
@@ -166,9 +165,7 @@ def _measurements(schedule: Schedule) -> dict[str, int]:
 
 def _files(experiment: Experiment, problem: Problem, totals: Totals, runs: int) -> dict[str, int]:
     """Bytes of what is written, from the tables of some runs; a checkpoint is there twice while it is replaced."""
-    made = tables(totals)
-    made["consistency"] = consistency_table(totals, made["statistics"], problem.truth.measurements)
-    written = sizes.written(made)
+    written = sizes.written(of_totals(problem, totals))
     of_kept, rows = written.pop(sizes.KEPT), min(totals.kept.count, problem.layout.keep_runs)
     checkpoint = sizes.checkpoint(totals, runs)
     return {

@@ -22,6 +22,7 @@ from nlbench.config.precision import RELATIVE_TO, Precision
 from nlbench.engine.compiled import CAPACITY, compile_chunks
 from nlbench.engine.driver import compute
 from nlbench.engine.interruption import stop_requests
+from nlbench.engine.memory import memory_faults
 from nlbench.engine.problem import make
 from nlbench.engine.resume import resumed
 from nlbench.engine.workers import Threads
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from nlbench.config import Experiment
-    from nlbench.engine.driver import Progress
+    from nlbench.engine.driver import Check, Progress
     from nlbench.statistics.layout import Layout
     from nlbench.statistics.totals import Totals
 
@@ -149,24 +150,30 @@ def _of_median(size: np.ndarray) -> np.ndarray:
 
 
 def choose(
-    experiment: Experiment, precision: Precision, out: str | Path, progress: Progress | None = None
+    experiment: Experiment,
+    precision: Precision,
+    out: str | Path,
+    progress: Progress | None = None,
+    check: Check | None = None,
 ) -> Chosen:
     """Compute the pilot, where the results in `out` do not hold it already, and choose the runs.
 
     The pilot is the beginning of the run, which goes on from its checkpoint. It is the same whatever was computed
-    before, and so is the choice. Raises what `run` raises.
+    before, and so is the choice. check: may raise before anything is computed. Raises what `run` raises.
     """
-    with stop_requests() as stopped:
+    with stop_requests() as stopped, memory_faults():
         problem = make(experiment)
         compiled = compile_chunks(problem, experiment.monte_carlo.seed)
-        folder = RunFolder(Path(out) / experiment.experiment / experiment.hash12())
+        folder = RunFolder(experiment.folder(out))
         with folder.locked():
             totals = resumed(folder, compiled)
             blocks = math.ceil(pilot_runs(problem.layout) / problem.block)
             if totals.blocks < blocks:
+                runs, threads = blocks * problem.block, experiment.engine.threads or runtime.threads()
+                if check is not None:
+                    check(compiled, totals, runs, threads, folder.path)
                 folder.reopen()
                 folder.write_experiment(experiment.resolved_yaml())
-                runs, threads = blocks * problem.block, experiment.engine.threads or runtime.threads()
                 chunk = experiment.engine.chunk or CAPACITY
                 report = progress or (lambda done, total: None)
                 with Threads(compiled, runs, threads) as workers:
