@@ -72,7 +72,7 @@ def invoke(tmp_path, monkeypatch):
             "divergence": divergence(dict.fromkeys(LABELS, 0) | (diverged or {})),
             "claims": claims(verdict),
         }
-        results = SimpleNamespace(path=tmp_path / "r", table=tables.__getitem__, manifest={"runs": 20_000})
+        results = SimpleNamespace(path=tmp_path / "r", table=tables.__getitem__, manifest={"runs": 25_000})
         monkeypatch.setattr(engine, "run", lambda *arguments, **keywords: results)
         monkeypatch.setattr(report, "write", lambda results: results.path / "report.html", raising=False)
         return CliRunner().invoke(app, ["run", str(written(tmp_path, text)), *options])
@@ -84,6 +84,7 @@ def test_the_table_has_each_filter_at_the_report_times_with_standard_errors(invo
     done = invoke()
     assert done.exit_code == 0, done.stderr
     lines = done.stdout.splitlines()
+    assert "culver/hermite-01, 25,000 runs, seed 1969" in done.stdout  # more than the file asks for were there
     assert "t = 0.5" in done.stdout
     assert "t = 0.9" not in done.stdout
     rows = [line for line in lines if line.startswith("  third 3 sigma") and "(12)" in line]
@@ -132,7 +133,7 @@ def test_json_is_one_document_in_which_nan_is_null(invoke):
     assert facts["exit_code"] == done.exit_code == 4
     assert [row["value"] for row in facts["rms"] if row["filter"] == "exact"] == [None] * 4
     assert facts["claims"][0]["verdict"] == "refuted"
-    assert facts["runs"] == 20_000
+    assert facts["runs"] == 25_000
 
 
 def test_options_reach_the_experiment(invoke, monkeypatch, tmp_path):
