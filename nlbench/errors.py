@@ -46,6 +46,11 @@ def printable(text: str) -> str:
     )
 
 
+def said(error: BaseException) -> str:
+    """The first line of what an error says, after a colon; nothing where it says nothing, as a bare `assert`."""
+    return "".join(f": {line}" for line in str(error).strip().splitlines()[:1])
+
+
 def _pointed(line: str, column: int) -> str:
     """The line with a caret under its column (from 1), cut to the width of a terminal around that column."""
     start = max(0, column - 1 - WIDTH // 2) if len(line) > WIDTH else 0

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from nlbench.algebra import expand
+from nlbench.shapes import stacked
 from nlbench.systems.discrete import DiscreteSystem
 
 if TYPE_CHECKING:
@@ -105,8 +106,3 @@ def curvatures(function: Callable, p: int, n: int) -> list[tuple[int, ...]]:
 
     jax.eval_shape(second, jnp.zeros(p), jnp.zeros(n))
     return found
-
-
-def stacked(y: Any) -> Any:
-    """An array, also where a system returned a tuple of scalars."""
-    return jnp.stack([jnp.asarray(part) for part in y]) if isinstance(y, (tuple, list)) else jnp.asarray(y)

@@ -20,7 +20,7 @@ from nlbench.simulate import path
 from nlbench.statistics.layout import Layout
 from nlbench.systems.discrete import DiscreteSystem
 from nlbench.systems.exact import InitialPosterior
-from nlbench.systems.system import Coordinate, Sets, System, kind
+from nlbench.systems.system import Coordinate, Sets, System, kind, state_names
 
 if TYPE_CHECKING:
     from nlbench.config import Experiment, FilterSpec
@@ -71,7 +71,8 @@ def make(experiment: Experiment, own: System | DiscreteSystem | None = None) -> 
         experiment.system.name, **{**experiment.system.parameters, **experiment.truth}
     )
     truth = stated.truth or stated
-    filters.check(truth)
+    for each in (truth,) if stated is truth else (truth, stated):
+        filters.check(each)
     times = _schedule(experiment, truth)
     models = _models(experiment, own)
     makers: list[Callable[[], Runner]] = [
@@ -237,11 +238,6 @@ def overridden(initial: Moments, given: dict[str, Any]) -> Moments:
             f"the system needs ({n},) and ({n}, {n})"
         )
     return changed
-
-
-def state_names(n: int) -> list[str]:
-    """Names of the states of a system that names none."""
-    return ["x"] if n == 1 else [f"x{i + 1}" for i in range(n)]
 
 
 def _layout(experiment: Experiment, truth: System | DiscreteSystem) -> Layout:

@@ -11,8 +11,9 @@ import numpy as np
 from nlbench.algebra import compact_address
 from nlbench.checks import known
 from nlbench.engine.compiled import compile_chunks
-from nlbench.engine.problem import make, state_names
+from nlbench.engine.problem import make
 from nlbench.errors import ConfigError
+from nlbench.systems.system import state_names
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,6 +7,8 @@ from html import escape
 from io import BytesIO
 from typing import TYPE_CHECKING, NamedTuple
 
+from nlbench.names import of_file
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -26,8 +28,8 @@ class Picture(NamedTuple):
 
     @property
     def file_name(self) -> str:
-        """The name without characters that mean something in a path, a link or an identifier."""
-        return re.sub(r"[^A-Za-z0-9_.-]", "_", self.name)
+        """The name as a path, a link or an identifier may hold it."""
+        return of_file(self.name)
 
 
 def settle(picture: Picture) -> Picture:

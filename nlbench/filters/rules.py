@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from nlbench.errors import ConfigError, Problem
-from nlbench.systems.system import Coordinate, Sets
+from nlbench.names import of_file
+from nlbench.shapes import returned
+from nlbench.systems.system import Coordinate, Sets, state_names
 
 if TYPE_CHECKING:
     from nlbench.systems.discrete import DiscreteSystem
     from nlbench.systems.system import System
 
+LONGEST = 60  # characters of a name or unit
+# Other columns of the table of runs, and the row of all errors together.
+TAKEN = ("all", "diverged", "filter", "run", "time")
+BESIDE = ("_variance", "_third")  # what columns beside that of an error end with
+
 
 def check_rules(system: System | DiscreteSystem) -> None:
     """Raises `ConfigError` with a line for each shape, name or number that does not fit, got and expected."""
-    found = [*_errors(system), *_measured(system), *_sampled(system)]
+    found = [*_errors(system), *_named(system), *_measured(system), *_sampled(system)]
     if system.interval is not None and not system.interval > 0:
         found.append(f"interval: got {system.interval!r}, expected a number above 0, or None")
     if found:
@@ -29,11 +35,10 @@ def check_rules(system: System | DiscreteSystem) -> None:
 def _errors(system: System | DiscreteSystem) -> Iterator[str]:
     """Coordinates, errors, and what is made of them."""
     n = system.states
-    if system.coordinates is not None:
-        odd = [each for each in system.coordinates if not isinstance(each, Coordinate)]
-        if odd:
-            yield f"coordinates: got {odd[0]!r}, expected nlbench.Coordinate(name, unit)"
-            return
+    odd = _odd(system)
+    if odd:
+        yield f"coordinates: got {odd[0]!r}, expected nlbench.Coordinate(name, unit)"
+        return
     c = n if system.coordinates is None else len(system.coordinates)
     if system.error is None:
         if c != n:
@@ -50,8 +55,51 @@ def _errors(system: System | DiscreteSystem) -> Iterator[str]:
     if system.diverged_late is not None:
         members.append(("diverged_late", system.diverged_late.members))
     for name, chosen in members:
-        if not all(0 <= member < c for member in chosen):
+        if not chosen or not all(member in range(c) for member in chosen):
             yield f"{name}: got members {tuple(chosen)}, expected numbers of coordinates, 0 to {c - 1}"
+
+
+def _odd(system: System | DiscreteSystem) -> list[Any]:
+    return [each for each in system.coordinates or () if not isinstance(each, Coordinate)]
+
+
+def _named(system: System | DiscreteSystem) -> Iterator[str]:
+    """Errors and norms are columns, rows and files by their names, each its own."""
+    if _odd(system):
+        return
+    coordinates = system.coordinates or tuple(Coordinate(name) for name in state_names(system.states))
+    given = [
+        *(("coordinates", each.name) for each in coordinates),
+        *(("norms", name) for name in system.norms),
+    ]
+    for of, text in given:
+        if not _in_a_line(text) or not text:
+            yield f"{of}: got the name {text!r}, expected 1 to {LONGEST} printable characters, no space around them"
+    for each in coordinates:
+        if not _in_a_line(each.unit):
+            yield f"coordinates: got the unit {each.unit!r}, expected at most {LONGEST} printable characters"
+    named = [(of, text) for of, text in given if _in_a_line(text) and text]
+    for place, (of, name) in enumerate(named):
+        clash = _clash(name, [other for _, other in named], [other for _, other in named[:place]])
+        if clash:
+            yield f"{of}: the name '{name}' {clash}; choose another"
+
+
+def _in_a_line(text: Any) -> bool:
+    return isinstance(text, str) and text.isprintable() and text == text.strip() and len(text) <= LONGEST
+
+
+def _clash(name: str, names: Sequence[str], before: Sequence[str]) -> str:
+    """What a name is already that of; nothing if it is free. before: those of `names` that come first."""
+    if name in TAKEN:
+        return "has another meaning in tables"
+    if name in before:
+        return "stands twice"
+    beside = [other for other in names for end in BESIDE if name == f"{other}{end}"]
+    if beside:
+        return f"is that of a column beside '{beside[0]}'"
+    same = [other for other in before if of_file(other) == of_file(name)]
+    return f"gives figures the same files as '{same[0]}' (A-Z a-z 0-9 _ . - count)" if same else ""
 
 
 def _measured(system: System | DiscreteSystem) -> Iterator[str]:
@@ -75,31 +123,4 @@ def _sampled(system: System | DiscreteSystem) -> Iterator[str]:
         size = system.sample.size
         yield from returned("sample.transform(normals)", system.sample.transform, ((size, n),), (size, n))
     elif system.sample is not None:
-        yield from _of_shape("sample(key)", lambda: jax.eval_shape(system.sample, jax.random.key(0)), (n,))
-
-
-def returned(
-    name: str, function: Callable, takes: tuple[Any, ...], expected: tuple[int, ...]
-) -> Iterator[str]:
-    """What is wrong with the shape that function returns for arrays of the shapes `takes` (a number: a vector)."""
-    arrays = [jnp.zeros(each) for each in takes]
-    yield from _of_shape(name, lambda: jax.eval_shape(lambda *x: _array(function(*x)), *arrays), expected)
-
-
-def _of_shape(name: str, shaped: Callable[[], Any], expected: tuple[int, ...]) -> Iterator[str]:
-    try:
-        shape = shaped().shape
-    except Exception as error:
-        said = str(error).splitlines()[0] if str(error) else ""
-        yield f"{name}: raises {type(error).__name__}: {said}"
-        return
-    if shape != expected:
-        yield f"{name}: got shape {shape}, expected {expected}"
-
-
-def _array(value: Any) -> Any:
-    return (
-        jnp.stack([jnp.asarray(part) for part in value])
-        if isinstance(value, (tuple, list))
-        else jnp.asarray(value)
-    )
+        yield from returned("sample(key)", system.sample, (jax.random.key(0),), (n,))

@@ -201,3 +201,8 @@ def kind(system: Any) -> Kind:
     """The kind of a `System` or `DiscreteSystem`."""
     timed = isinstance(system, System)
     return Kind(discrete=not timed, continuous=timed and system.measurement == "continuous")
+
+
+def state_names(n: int) -> list[str]:
+    """Names of the states of a system that names none."""
+    return ["x"] if n == 1 else [f"x{i + 1}" for i in range(n)]

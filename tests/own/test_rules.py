@@ -43,8 +43,12 @@ BOTH = {
     "diverged": ({"diverged": lambda e: e > 1}, "diverged(error): got shape (2,), expected ()"),
     "clip": ({"clip": (1.0,)}, "clip: got 1 bounds, expected 2"),
     "norms": (
-        {"norms": {"all": (0, 2)}},
-        "norms['all']: got members (0, 2), expected numbers of coordinates, 0 to 1",
+        {"norms": {"both": (0, 2)}},
+        "norms['both']: got members (0, 2), expected numbers of coordinates, 0 to 1",
+    ),
+    "an empty norm": (
+        {"norms": {"position": ()}},
+        "norms['position']: got members (), expected numbers of coordinates, 0 to 1",
     ),
     "late": ({"diverged_late": LateError(1.0, 1.0, (3,))}, "diverged_late: got members (3,)"),
     "residual": ({"residual": lambda y, h: jnp.sum(y - h)}, "residual(y, h): got shape (), expected (1,)"),
@@ -57,6 +61,26 @@ BOTH = {
         {"initial": nb.Moments(np.zeros(2), np.array([[1.0, 1.0], [0.0, 1.0]]))},
         "initial.cov: is not symmetric",
     ),
+}
+# Names of two errors and of a norm, and the unit of the first; and what is wrong with them.
+NAMES = {
+    "a column": (("time", "b", "n", ""), "coordinates: the name 'time' has another meaning in tables"),
+    "what is lost": (("a", "diverged", "n", ""), "coordinates: the name 'diverged' has another meaning"),
+    "the row of all": (("a", "b", "all", ""), "norms: the name 'all' has another meaning in tables"),
+    "twice": (("a", "a", "n", ""), "coordinates: the name 'a' stands twice"),
+    "an error and a norm": (("a", "b", "a", ""), "norms: the name 'a' stands twice"),
+    "a variance": (("a_variance", "a", "n", ""), "coordinates: the name 'a_variance' is that of a column"),
+    "a third moment": (("a", "b", "b_third", ""), "norms: the name 'b_third' is that of a column beside 'b'"),
+    "a file": (("a_b", "a/b", "n", ""), "coordinates: the name 'a/b' gives figures the same files as 'a_b'"),
+    "nothing": (("", "b", "n", ""), "coordinates: got the name '', expected 1 to 60 printable characters"),
+    "no text": ((1, "b", "n", ""), "coordinates: got the name 1, expected"),
+    "two lines": (("a\nb", "b", "n", ""), "coordinates: got the name 'a\\nb', expected"),
+    "long": (("a", "b", "n" * 61, ""), "norms: got the name 'nnn"),
+    "a unit of two lines": (
+        ("a", "b", "n", "m\ns"),
+        "coordinates: got the unit 'm\\ns', expected at most 60",
+    ),
+    "no unit": (("a", "b", "n", None), "coordinates: got the unit None, expected at most 60"),
 }
 OF_TIMED = {
     "diffusion_cov": ({"diffusion_cov": np.ones((2, 3))}, "diffusion_cov: got shape (2, 3), expected (2, 2)"),
@@ -75,6 +99,27 @@ def test_what_does_not_fit_is_said(system, case):
     said = complaints(altered(system, **changes))
     assert len(said) == 1
     assert said[0].startswith(message)
+
+
+@pytest.mark.parametrize("case", NAMES)
+def test_a_name_that_is_no_column_row_or_file_of_its_own_is_said(case):
+    (first, second, norm, unit), message = NAMES[case]
+    coordinates = (nb.Coordinate(first, unit), nb.Coordinate(second))
+    (said,) = complaints(altered(TIMED, coordinates=coordinates, norms={norm: (0, 1)}))
+    assert said.startswith(message)
+
+
+def test_errors_without_names_have_those_of_the_states():
+    assert complaints(altered(TIMED, norms={"x2": (0, 1)})) == [
+        "norms: the name 'x2' stands twice; choose another"
+    ]
+
+
+def test_names_of_errors_are_checked_where_another_system_makes_the_data():
+    coordinates = (nb.Coordinate("time"), nb.Coordinate("b"))
+    own = altered(TIMED, coordinates=coordinates, truth=TIMED)
+    with pytest.raises(ConfigError, match="'time' has another meaning in tables"):
+        nb.run({"experiment": "x", "system": own, "filters": ["ekf"]})
 
 
 @pytest.mark.parametrize("case", OF_TIMED)
