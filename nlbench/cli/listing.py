@@ -14,6 +14,8 @@ from nlbench.errors import ConfigError, printable
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
+UNDECIDED = "as parameters without a default decide"  # the kind of a system that cannot be made without them
+
 
 class What(StrEnum):
     """What can be listed."""
@@ -53,6 +55,8 @@ def _registry(what: What) -> tuple[Any, Any, Any]:
 
     def of_system(name: str) -> dict[str, type[BaseModel]]:
         model = systems.parameters(name)
+        if any(field.is_required() for field in model.model_fields.values()):
+            return {UNDECIDED: model}
         return {catalogue.KINDS[systems.kind(name, model().model_dump())]: model}
 
     def of_filter(name: str) -> dict[str, type[BaseModel]]:
@@ -64,7 +68,10 @@ def _registry(what: What) -> tuple[Any, Any, Any]:
 
 
 def _all(what: What, json: bool) -> None:
+    from nlbench import plugins
+
     names, summary, models = _registry(what)
+    names = plugins.working("systems" if what is What.systems else "filters", names)
     entries = [{"name": name, "summary": summary(name), "kinds": list(models(name))} for name in names]
     if json:
         output.as_json(entries)
@@ -120,9 +127,16 @@ def _fields(model: type[BaseModel]) -> Any:
     from nlbench.config.explain import expected, plain
 
     for name, field in model.model_fields.items():
-        default = plain(field.get_default(call_default_factory=True))
+        required = field.is_required()
+        default = None if required else plain(field.get_default(call_default_factory=True))
         takes = expected(field.annotation, tuple(field.metadata))
-        yield {"name": name, "default": default, "takes": takes, "description": field.description or ""}
+        yield {
+            "name": name,
+            "default": default,
+            "required": required,
+            "takes": takes,
+            "description": field.description or "",
+        }
 
 
 def _described(field: dict[str, Any]) -> str:
@@ -130,7 +144,8 @@ def _described(field: dict[str, Any]) -> str:
 
     default = field["default"]
     shown = found(default) if not isinstance(default, (dict, list)) else str(default)
-    return "; ".join(part for part in (field["description"], field["takes"], f"default {shown}") if part)
+    ending = "required" if field["required"] else f"default {shown}"
+    return "; ".join(part for part in (field["description"], field["takes"], ending) if part)
 
 
 def _experiments(folder: Path, json: bool) -> None:

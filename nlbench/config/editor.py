@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from nlbench import systems
+from nlbench import plugins, systems
 from nlbench.config.assemble import MANDATORY, SECTIONS, Named
 from nlbench.config.claim import Claim
 from nlbench.config.schema import Experiment, Head, Initial, TimeSpec
@@ -93,16 +93,17 @@ def _entry(name: Schema, properties: Schema) -> Schema:
 
 
 def _system() -> Schema:
+    names = plugins.working("systems", systems.available())
     named = [
         _entry(
             {"const": name, "description": systems.summary(name)},
             _properties(systems.parameters(name)),
         )
-        for name in systems.available()
+        for name in names
     ]
     return {
         "description": "the system, by name, and its parameters",
-        "anyOf": [{"enum": list(systems.available())}, *named],
+        "anyOf": [{"enum": names}, *named],
     }
 
 
@@ -110,15 +111,16 @@ def _filters() -> Schema:
     """A name alone, or a mapping; one alternative for all names that take the same options."""
     common = {key: value for key, value in _properties(Named).items() if key != "name"}
     groups: dict[type[BaseModel], list[str]] = {}
-    for name, model in _options():
+    available = plugins.working("filters", catalogue.available())
+    for name, model in _options(available):
         names = groups.setdefault(model, [])
         names += [name] if name not in names else []
     entries = [_entry({"enum": names}, {**_properties(model), **common}) for model, names in groups.items()]
-    return {"anyOf": [{"enum": list(catalogue.available())}, *entries]}
+    return {"anyOf": [{"enum": available}, *entries]}
 
 
-def _options() -> Iterable[tuple[str, type[BaseModel]]]:
-    for name in catalogue.available():
+def _options(names: Iterable[str]) -> Iterable[tuple[str, type[BaseModel]]]:
+    for name in names:
         for kind in catalogue.takes(name):
             yield name, catalogue.options(name, *kind)
 

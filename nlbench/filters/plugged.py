@@ -9,13 +9,13 @@ import jax
 import jax.numpy as jnp
 
 from nlbench import plugins
-from nlbench.errors import ConfigError, Problem
+from nlbench.errors import ConfigError, Problem, said
 from nlbench.filters.filter import Filter, UpdateInfo
+from nlbench.systems.discrete import DiscreteSystem
+from nlbench.systems.system import System
 
 if TYPE_CHECKING:
     from nlbench.row import Row
-    from nlbench.systems.discrete import DiscreteSystem
-    from nlbench.systems.system import System
 
 
 def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) -> Filter:
@@ -27,30 +27,31 @@ def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) ->
     if not isinstance(made, Filter):
         wrong = [f"made a {type(made).__name__}, expected a nlbench.filters.filter.Filter"]
     else:
-        wrong = list(misfits(made))
+        wrong = list(misfits(made, system))
     if wrong:
         raise ConfigError([Problem(f"filter '{name}': {each}", file=plugin.path) for each in wrong])
     return made
 
 
-def misfits(made: Filter) -> Iterator[str]:
-    """What is wrong with what the functions of a filter return: a line for each, got and expected."""
-    system = made.system
-    n, m = system.states, system.measurements
-    discrete = not hasattr(system, "drift")
-    t, h = (0, 1) if discrete else (0.0, 0.1)
+def misfits(made: Filter, system: System | DiscreteSystem) -> Iterator[str]:
+    """What is wrong with what the functions of a filter return for a system: a line for each, got and expected."""
+    n, m, own = system.states, system.measurements, made.system
+    if not isinstance(own, (System, DiscreteSystem)) or (own.states, own.measurements) != (n, m):
+        yield "system: expected the system that the factory is given, or one of as many states and measurements"
+        return
+    sightings = isinstance(system, System) and system.sightings is not None
+    t, h = (0, 1) if isinstance(system, DiscreteSystem) else (0.0, 0.1)
     try:
         state = _shapes("init(moments)", lambda: made.init(system.initial, jax.random.key(0)))
+        if not made.random:
+            _shapes("init(moments), without a key since `random` is False", lambda: made.init(system.initial))
         moved = _shapes("integrate(state, t, h, count)", lambda s: made.integrate(s, t, h, 2), state)
         yield from _same("integrate(state, t, h, count)", moved, state)
-        updated = _shapes("update(state, t, y)", lambda s, y: made.update(s, t, y), state, jnp.zeros(m))
-        if not isinstance(updated, tuple) or len(updated) != 2 or not isinstance(updated[1], UpdateInfo):
-            yield f"update(state, t, y): got {type(updated).__name__}, expected (state, UpdateInfo)"
-        else:
-            yield from _same("update(state, t, y)", updated[0], state)
-            yield from _informed(updated[1], m)
+        yield from _updated(made, state, t, m, sightings)
         yield from _moments(_shapes("moments(state)", made.moments, state), n)
         yield from _components(_shapes("components(state)", made.components, state), n)
+        if sightings:
+            yield from _angle(made, state)
     except _Raised as error:
         yield str(error)
 
@@ -64,8 +65,7 @@ def _shapes(name: str, function: Callable, *arguments: Any) -> Any:
     try:
         return jax.eval_shape(function, *arguments)
     except Exception as error:
-        said = str(error).splitlines()[0] if str(error) else ""
-        raise _Raised(f"{name}: raises {type(error).__name__}: {said}") from None
+        raise _Raised(f"{name}: raises {type(error).__name__}{said(error)}") from None
 
 
 def _same(name: str, state: Any, expected: Any) -> Iterator[str]:
@@ -75,23 +75,46 @@ def _same(name: str, state: Any, expected: Any) -> Iterator[str]:
         return
     for got, wanted in zip(jax.tree.leaves(state), jax.tree.leaves(expected), strict=True):
         if (got.shape, got.dtype) != (wanted.shape, wanted.dtype):
-            said = f"got a part of the state of shape {got.shape} {got.dtype}"
-            yield f"{name}: {said}, expected {wanted.shape} {wanted.dtype} as of init"
+            part = f"got a part of the state of shape {got.shape} {got.dtype}"
+            yield f"{name}: {part}, expected {wanted.shape} {wanted.dtype} as of init"
 
 
-def _informed(info: UpdateInfo, m: int) -> Iterator[str]:
+def _updated(made: Filter, state: Any, t: Any, m: int, sightings: bool) -> Iterator[str]:
+    """An update by the measurement at a time, or by the sighting of a number where the system has sightings."""
+    if sightings:
+        name, number = "update(state, t, y, sighting=number)", jnp.zeros((), int)
+        function = lambda s, y, number: made.update(s, t, y, sighting=number)  # noqa: E731
+        updated = _shapes(name, function, state, jnp.zeros(m), number)
+    else:
+        name = "update(state, t, y)"
+        updated = _shapes(name, lambda s, y: made.update(s, t, y), state, jnp.zeros(m))
+    if not isinstance(updated, tuple) or len(updated) != 2 or not isinstance(updated[1], UpdateInfo):
+        yield f"{name}: got {type(updated).__name__}, expected (state, UpdateInfo)"
+        return
+    yield from _same(name, updated[0], state)
     expected: dict[str, tuple[int, ...]] = {"innovation": (m,), "innovation_cov": (m, m)}
-    for name in UpdateInfo._fields:
-        shape, wanted = jnp.shape(getattr(info, name)), expected.get(name, ())
-        if shape != wanted:
-            yield f"update(state, t, y): {name}: got shape {shape}, expected {wanted}"
+    for part, value in updated[1]._asdict().items():
+        yield from _array(f"{name}: {part}", value, expected.get(part, ()))
+
+
+def _angle(made: Filter, state: Any) -> Iterator[str]:
+    """What sightings wait for."""
+    if made.angle is None:
+        yield "angle: got None, expected a function of the state, since the system has sightings"
+    else:
+        yield from _array("angle(state)", _shapes("angle(state)", made.angle, state), ())
+
+
+def _array(name: str, value: Any, expected: tuple[int, ...]) -> Iterator[str]:
+    shape = getattr(value, "shape", None)
+    if shape != expected:
+        got = f"shape {shape}" if shape is not None else "None" if value is None else type(value).__name__
+        yield f"{name}: got {got}, expected {expected}"
 
 
 def _moments(moments: Any, n: int) -> Iterator[str]:
     for name, wanted in (("mean", (n,)), ("cov", (n, n))):
-        got = getattr(moments, name, None)
-        if got is None or got.shape != wanted:
-            yield f"moments(state): {name}: got {got if got is None else f'shape {got.shape}'}, expected {wanted}"
+        yield from _array(f"moments(state): {name}", getattr(moments, name, None), wanted)
 
 
 def _components(components: Any, n: int) -> Iterator[str]:

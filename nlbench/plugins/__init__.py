@@ -8,11 +8,11 @@ built-in ones. An experiment file alone never makes code run. Importing this loa
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from nlbench.errors import ConfigError
+from nlbench.errors import ConfigError, Problem
 from nlbench.plugins import installed, source
 from nlbench.plugins.plugin import Entry, Kind, Plugin, made, stand_in
 
@@ -29,6 +29,7 @@ __all__ = [
     "names",
     "restore",
     "standing_in",
+    "working",
 ]
 
 _allowed: dict[str, Plugin] = {}  # by digest, in the order in which the user named them
@@ -40,12 +41,17 @@ def allow(*paths: str | Path, taken: Mapping[Kind, Collection[str]]) -> None:
 
     taken: names that are not free. Raises `ConfigError` with everything that is wrong with them.
     """
-    problems, new = [], []
+    problems: list[Problem] = []
+    new: list[Plugin] = []
     for path in paths:
         try:
-            new.append(_free(source.of_file(path), taken))
+            plugin = source.of_file(path)
         except ConfigError as error:
             problems += error.problems
+            continue
+        kept = [each for each in _allowed.values() if each.path not in map(str, paths)]
+        problems += _clashes(plugin, [*kept, *new], taken)
+        new.append(plugin)
     if problems:
         raise ConfigError(problems)
     for plugin in new:
@@ -66,6 +72,11 @@ def names(kind: Kind) -> tuple[str, ...]:
     """Names of the systems or filters that plug-ins bring; what is only installed is not imported for it."""
     own = [name for plugin in (*_standing_in, *_allowed.values()) for name in plugin.entries(kind)]
     return tuple(dict.fromkeys([*own, *installed.names(kind)]))
+
+
+def working(kind: Kind, names: Iterable[str]) -> list[str]:
+    """The names without those of installed plug-ins that are broken, each of which is said once."""
+    return [name for name in names if installed.works(kind, name)]
 
 
 def find(kind: Kind, name: str) -> tuple[Plugin, Entry] | None:
@@ -125,15 +136,18 @@ def _register(plugin: Plugin) -> None:
     _allowed[plugin.digest] = plugin
 
 
-def _free(plugin: Plugin, taken: Mapping[Kind, Collection[str]]) -> Plugin:
-    """The plug-in, if all its names are free. Raises `ConfigError` otherwise."""
+def _clashes(
+    plugin: Plugin, others: Sequence[Plugin], taken: Mapping[Kind, Collection[str]]
+) -> Iterator[Problem]:
+    """What is wrong with the names of a plug-in: those that are not free. The same code twice is one plug-in."""
+    others = [other for other in others if other.digest != plugin.digest and other.path != plugin.path]
     for kind in taken:
         for name in plugin.entries(kind):
+            of = next((other.path for other in others if name in other.entries(kind)), None)
             if name in taken[kind]:
-                raise ConfigError(f"{plugin.path}: {kind}: '{name}' is a built-in name; choose another")
-            other = next(
-                (p for p in _allowed.values() if name in p.entries(kind) and p.path != plugin.path), None
-            )
-            if other is not None:
-                raise ConfigError(f"{plugin.path}: {kind}: '{name}' is already that of {other.path}")
-    return plugin
+                yield Problem(f"{kind}: '{name}' is a built-in name; choose another", file=plugin.path)
+            elif of is not None:
+                yield Problem(f"{kind}: '{name}' is already that of {of}", file=plugin.path)
+            elif name in installed.names(kind):
+                message = f"{kind}: '{name}' is already that of an installed package; choose another"
+                yield Problem(message, file=plugin.path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import logging
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -14,7 +15,9 @@ from nlbench.plugins import trouble
 from nlbench.plugins.plugin import Kind, Plugin
 from nlbench.plugins.signature import entry_of
 
+log = logging.getLogger("nlbench")
 _found: dict[tuple[str, str], Plugin] = {}  # by kind and name
+_broken: set[tuple[str, str]] = set()  # those that were said to be
 
 
 def names(kind: Kind) -> tuple[str, ...]:
@@ -32,10 +35,22 @@ def find(kind: Kind, name: str) -> Plugin | None:
     return _found[kind, name]
 
 
+def works(kind: Kind, name: str) -> bool:
+    """Whether a name is none that a broken plug-in brings; one that is broken is said, once."""
+    try:
+        find(kind, name)
+    except ConfigError as error:
+        if (kind, name) not in _broken:
+            log.warning("%s; left out", error)
+        _broken.add((kind, name))
+        return False
+    return True
+
+
 def has(digest: str) -> bool:
-    """Whether an installed plug-in with this code was found or can be."""
+    """Whether an installed plug-in with this code was found or can be; one that is broken is not it."""
     kinds: tuple[Kind, ...] = ("systems", "filters")
-    return any(_digest(point) == digest for kind in kinds for point in _points(kind).values())
+    return any(_is(point, digest) for kind in kinds for point in _points(kind).values())
 
 
 @cache
@@ -55,6 +70,13 @@ def _loaded(kind: Kind, name: str, point: EntryPoint) -> Plugin:
     return Plugin(
         point.dist.name if point.dist else point.module, _digest(point), where, "", systems, filters
     )
+
+
+def _is(point: EntryPoint, digest: str) -> bool:
+    try:
+        return _digest(point) == digest
+    except (ConfigError, OSError, ValueError):
+        return False
 
 
 @cache

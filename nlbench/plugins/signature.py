@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any, get_type_hints
 
-from pydantic import BaseModel, Field, PositiveFloat, create_model
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, create_model
 
-from nlbench.errors import ConfigError, Problem
+from nlbench.errors import ConfigError, Problem, said
 from nlbench.plugins.plugin import Entry, Kind
 from nlbench.row import StrictOptions
 
@@ -20,10 +21,18 @@ TOLD: dict[str, Any] = {
     ),
     "missing": (bool, Field(default=True, description="whether measurements may be NaN, meaning not taken")),
 }
+# Keys that stand beside the parameters in an experiment file, and mean something else.
+RESERVED = {"systems": ("name",), "filters": ("name", "label", "model", "initial")}
 TAKES = {
     "systems": "(parameter=default, ...) or one pydantic model",
     "filters": "(system, option=default, ...) or (system, options), options a pydantic model",
 }
+
+
+class Strict(BaseModel):
+    """What a plug-in's own model becomes too: unknown keys, and numbers that are not finite, are mistakes."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 def entry_of(factory: Any, kind: Kind, name: str, path: str) -> Entry:
@@ -34,8 +43,11 @@ def entry_of(factory: Any, kind: Kind, name: str, path: str) -> Entry:
     try:
         given = list(inspect.signature(factory).parameters.values())
         hints = get_type_hints(factory, include_extras=True)
-    except (TypeError, ValueError, NameError) as error:
-        raise _wrong(path, f"{where}: its signature cannot be read: {error}", factory) from None
+    except Exception as error:  # annotations are code
+        message = (
+            f"{where}: its signature cannot be read: {_unread(factory)}{type(error).__name__}{said(error)}"
+        )
+        raise _wrong(path, message, factory) from None
     leading = 1 if kind == "filters" else 0
     shown = f"{getattr(factory, '__name__', name)}{inspect.signature(factory)}"
     if len(given) < leading or any(each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD) for each in given):
@@ -43,14 +55,40 @@ def entry_of(factory: Any, kind: Kind, name: str, path: str) -> Entry:
     own = given[leading:]
     base = hints.get(own[0].name) if len(own) == 1 else None
     if isinstance(base, type) and issubclass(base, BaseModel):
-        model, takes_model = base, True
+        model, takes_model = _strict(base, where, path, factory), True
     else:
         model, takes_model = _model(own, hints, where, path, factory), False
+    reserved = [name for name in model.model_fields if name in RESERVED[kind]]
+    if reserved:
+        message = f"{where}: '{reserved[0]}' means something else beside its name in an experiment; rename it"
+        raise _wrong(path, message, factory)
     told = TOLD if kind == "filters" else {}
     missing = {key: value for key, value in told.items() if key not in model.model_fields}
     full = create_model(model.__name__, __base__=model, **missing) if missing else model
     summary = (inspect.getdoc(factory) or "").split("\n")[0] or f"of {path}"
     return Entry(summary, full, _called(factory, [each.name for each in own], takes_model))
+
+
+def _unread(factory: Any) -> str:
+    """The annotation of a function that cannot be read, if it is one of those."""
+    names = getattr(inspect.unwrap(factory), "__globals__", {})
+    for name, annotation in getattr(factory, "__annotations__", {}).items():
+        alone = SimpleNamespace(__annotations__={name: annotation}, __globals__=names)
+        try:
+            get_type_hints(alone)
+        except Exception:
+            of = "what it returns" if name == "return" else f"'{name}'"
+            return f"annotation {annotation!r} of {of}: "
+    return ""
+
+
+def _strict(model: type[BaseModel], where: str, path: str, factory: Any) -> type[BaseModel]:
+    """A model of the plug-in's own that refuses what all options refuse."""
+    try:
+        return create_model(model.__name__, __base__=(model, Strict))
+    except Exception as error:
+        message = f"{where}: {model.__name__} is no model of named parameters{said(error)}"
+        raise _wrong(path, message, factory) from None
 
 
 def _called(factory: Callable, names: list[str], takes_model: bool) -> Callable:
@@ -76,7 +114,7 @@ def _model(own: list[Any], hints: dict[str, Any], where: str, path: str, factory
         return create_model("Parameters", __base__=StrictOptions, **fields)
     except Exception as error:
         message = "parameters must be float, int, bool, str, or lists or tuples of them"
-        raise _wrong(path, f"{where}: {message} ({str(error).splitlines()[0]})", factory) from None
+        raise _wrong(path, f"{where}: {message} ({said(error)[2:]})", factory) from None
 
 
 def _wrong(path: str, message: str, factory: Any = None) -> ConfigError:

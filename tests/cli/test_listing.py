@@ -38,6 +38,26 @@ def test_the_parameters_of_every_name_can_be_shown(what, name, model):
     assert invoke("list", what, name).exit_code == 0
 
 
+def test_parameters_without_a_default_are_said_to_be_required(tmp_path):
+    plugin = tmp_path / "own.py"
+    plugin.write_text(
+        "def decay(rate: float, start: float = 1.0): pass\ndef mine(system, gain: float): pass\n"
+        "SYSTEMS = {'decay': decay}\nFILTERS = {'mine': mine}\n"
+    )
+    assert "decay" in invoke("list", "systems", "--plugin", str(plugin)).stdout
+    text = invoke("list", "systems", "decay", "--plugin", str(plugin)).stdout
+    assert "rate   a number; required\n" in text
+    assert "start  a number; default 1\n" in text
+    assert (
+        "gain     a number; required\n" in invoke("list", "filters", "mine", "--plugin", str(plugin)).stdout
+    )
+    shown = json.loads(invoke("list", "systems", "decay", "--json", "--plugin", str(plugin)).stdout)
+    assert [(each["name"], each["default"], each["required"]) for each in shown["parameters"]] == [
+        ("rate", None, True),
+        ("start", 1, False),
+    ]
+
+
 def test_experiments_are_listed_by_their_question_and_invalid_ones_are_said_to_be(tmp_path):
     (tmp_path / "culver").mkdir()
     written(tmp_path / "culver", VALID, "good.yaml")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 import subprocess
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,10 @@ from typer.testing import CliRunner
 import nlbench as nb
 from nlbench import config, plugins
 from nlbench.cli.app import app
+from nlbench.config.assemble import Named
 from nlbench.errors import ConfigError, EnvironmentFault
+from nlbench.plugins import installed
+from nlbench.plugins.signature import RESERVED
 from tests.small_runs import python
 
 SYSTEM = """
@@ -143,6 +147,23 @@ BROKEN = {
         "import numpy as np\ndef f(a: np.ndarray = None): pass\nSYSTEMS = {'walk': f}\n",
         "parameters must be float, int, bool, str",
     ),
+    "a system's parameter called name": (
+        "def f(name: str = 'x'): pass\nSYSTEMS = {'walk': f}\n",
+        "bad.py:1: system 'walk': 'name' means something else beside its name in an experiment",
+    ),
+    "a result's annotation": (
+        "from __future__ import annotations\nimport nlbench as nb\n"
+        "def f(a: float = 1.0) -> nb.Sytem: pass\nSYSTEMS = {'walk': f}\n",
+        "bad.py:3: system 'walk': its signature cannot be read: annotation 'nb.Sytem' of what it returns: AttributeE",
+    ),
+    "a parameter's annotation": (
+        "from __future__ import annotations\ndef f(a: flaot = 1.0): pass\nSYSTEMS = {'walk': f}\n",
+        "annotation 'flaot' of 'a': NameError: name 'flaot' is not defined",
+    ),
+    "a model without names": (
+        "import pydantic\ndef f(a: pydantic.RootModel[int]): pass\nSYSTEMS = {'walk': f}\n",
+        "bad.py:2: system 'walk': RootModel[int] is no model of named parameters",
+    ),
     "a built-in name": ("SYSTEMS = {'oscillator': print}\nprint = None\n", "wrong signature"),
     "a built-in name, well formed": (
         "def f(): pass\nSYSTEMS = {'oscillator': f}\n",
@@ -158,7 +179,16 @@ BROKEN = {
     ),
     "factory's types": (SYSTEM.replace("drift=", "drfit="), "system 'walk': making it failed: TypeError"),
     "drift": (SYSTEM.replace("0.0 * x", "jnp.zeros(2)"), "drift(t, x): got shape (2,), expected (1,)"),
-    "drift raises": (SYSTEM.replace("0.0 * x", "x[0] @ x"), "drift: raises"),
+    "drift raises": (
+        SYSTEM.replace("0.0 * x", "x[0] @ x"),
+        "drift(t, x): raises ValueError for shape (1,): ",
+    ),
+    "drift says nothing": (
+        SYSTEM.replace("drift=lambda t, x: 0.0 * x", "drift=drift").replace(
+            "SYSTEMS", "def drift(t, x):\n    assert x.shape == (3,)\n\nSYSTEMS"
+        ),
+        "drift(t, x): raises AssertionError for shape (1,)\n",
+    ),
     "observe": (
         SYSTEM.replace("lambda t, x: x,", "lambda t, x: x[0],"),
         "observe(t, x): got shape (), expected (1,)",
@@ -181,6 +211,57 @@ def test_a_broken_plugin_is_one_clear_line_before_anything_is_compiled(case, mon
     assert len([line for line in said.splitlines() if not line.startswith("    ")]) == 1
 
 
+@pytest.mark.parametrize("option", ["name", "label", "model", "initial"])
+@pytest.mark.parametrize("own", [True, False], ids=["of a model", "of a function"])
+def test_an_option_that_an_experiment_could_never_give_is_refused_when_the_plugin_is_loaded(option, own):
+    model = f"class Options(pydantic.BaseModel):\n    {option}: float = 1.0\n"
+    takes = "options: Options" if own else f"{option}=1.0"
+    Path("bad.py").write_text(f"import pydantic\n{model}def f(system, {takes}): pass\nFILTERS = {{'g': f}}\n")
+    assert f"filter 'g': '{option}' means something else" in problems("list", "filters", "--plugin", "bad.py")
+
+
+def test_what_an_experiment_says_beside_a_name_is_what_options_may_not_be_called():
+    assert set(RESERVED["filters"]) == set(Named.model_fields)
+
+
+def test_a_name_that_two_files_bring_is_refused_also_where_both_are_allowed_at_once():
+    Path("other.py").write_text(SYSTEM + "\n")
+    said = problems("list", "systems", "--plugin", "walk.py", "--plugin", "other.py")
+    assert said == "other.py: systems: 'walk' is already that of walk.py\n"
+    Path("other.py").write_text(SYSTEM)
+    assert command("list", "systems", "--plugin", "walk.py", "--plugin", "other.py").exit_code == 0
+
+
+def test_names_can_move_from_file_to_file():
+    nb.allow("walk.py")
+    Path("other.py").write_text(SYSTEM + "\n")
+    Path("walk.py").write_text(FILTER)
+    nb.allow("walk.py", "other.py")
+    assert plugins.find("systems", "walk")[0].file == "other.py"
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("{name: mine, fadign: 2}", "filters.0.fadign: unknown key; did you mean 'fading'?"),
+        ("{name: mine, fading: .inf}", "filters.0.fading: expected a number, found .inf"),
+    ],
+)
+def test_a_plain_model_refuses_what_all_options_refuse(entry, message):
+    Path("mine.py").write_text(
+        FILTER.replace("from nlbench.discrete.catalogue import GaussianOptions", "import pydantic").replace(
+            "def mine(system, options: GaussianOptions)",
+            "class Options(pydantic.BaseModel):\n    fading: float = 1.0\n    limiter: float | None = None\n\n"
+            "def mine(system, options: Options)",
+        )
+    )
+    Path("own.yaml").write_text(EXPERIMENT.replace("[ekf]", f"[{entry}]"))
+    assert message in problems("validate", "own.yaml", "--plugin", "walk.py", "--plugin", "mine.py")
+    Path("own.yaml").write_text(EXPERIMENT.replace("[ekf]", "[{name: mine, fading: 2}]"))
+    done = command("validate", "own.yaml", "--plugin", "walk.py", "--plugin", "mine.py")
+    assert done.exit_code == 0, done.output
+
+
 def test_validate_says_what_shape_does_not_fit():
     Path("walk.py").write_text(BROKEN["drift"][0])
     assert problems("validate", "own.yaml", "--plugin", "walk.py") == f"{BROKEN['drift'][1]}\n"
@@ -192,9 +273,13 @@ UNFIT = {
     "return made._replace(update=lambda s, t, y, key=None: s)": "expected (state, UpdateInfo)",
     "return made._replace(integrate=lambda s, t, h, c: (s.mean, s.cov))": "integrate(state, t, h, count): got a state",
     "return made._replace(integrate=lambda s, t, h, c: s._replace(mean=s.cov))": "expected (1,) float64 as of init",
+    "return made._replace(update=lambda s, t, y, key=None: (s, made.update(s, t, y)[1]._replace(guarded=None)))":
+        "update(state, t, y): guarded: got None, expected ()",
+    "return made._replace(moments=lambda s: nb.Moments([s.mean], s.cov))": "mean: got list, expected (1,)",
+    "return made._replace(system=None)": "system: expected the system that the factory is given",
     "return made._replace(moments=lambda s: nb.Moments(s.cov, s.cov))": "mean: got shape (1, 1), expected (1,)",
     "return made._replace(components=lambda s: None)": "components(state): mean: got 0 components, expected 1",
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("ending", UNFIT)
@@ -206,6 +291,29 @@ def test_a_filter_that_does_not_fit_is_one_clear_line(ending):
     said = problems("run", "own.yaml", "--plugin", "walk.py", "--plugin", "mine.py")
     assert UNFIT[ending] in said
     assert all(line.startswith("mine.py: filter 'mine': ") for line in said.splitlines())
+
+
+SIGHTED = {
+    "made._replace(angle=None)": "angle: got None, expected a function of the state",
+    "made._replace(angle=lambda s: s.mean)": "angle(state): got shape (4,), expected ()",
+    "made._replace(update=lambda s, t, y, key=None: made.update(s, t, y))":
+        "update(state, t, y, sighting=number): raises TypeError: ",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("ending", SIGHTED)
+def test_a_filter_that_knows_no_sightings_is_refused_by_a_system_that_has_them(ending):
+    text = FILTER.replace("return", "made =").replace("\n\nFILTERS", f"\n    return {ending}\n\nFILTERS")
+    Path("mine.py").write_text(text)
+    nb.allow("mine.py")
+    with pytest.raises(ConfigError) as raised:
+        nb.filters.build("mine", nb.systems.build("lunar-orbit"))
+    assert f"filter 'mine': {SIGHTED[ending]}" in str(raised.value)
+
+
+def test_a_filter_that_knows_sightings_is_taken_by_a_system_that_has_them():
+    nb.allow("mine.py")
+    assert nb.filters.build("mine", nb.systems.build("lunar-orbit")).angle is not None
 
 
 def test_the_source_is_part_of_the_identity_and_its_place_is_not(tmp_path):
@@ -320,3 +428,27 @@ def test_an_installed_package_brings_names_without_an_option(tmp_path):
     done = said("validate", "own.yaml")
     assert done.returncode == 2
     assert "(system 'lost', installed): importing it failed: ModuleNotFoundError" in done.stderr
+    for command in (["list", "systems"], ["schema"]):
+        done = said(*command)
+        assert done.returncode == 0, done.stderr
+        assert '"walk"' in done.stdout or "  walk " in done.stdout
+        assert "lost" not in done.stdout
+        (line,) = done.stderr.splitlines()
+        assert line.startswith("walks.lost:walk (system 'lost', installed): importing it failed: ")
+        assert line.endswith("; left out")
+    Path("own.yaml").write_text(EXPERIMENT)
+    assert (
+        "already that of an installed package" in said("validate", "own.yaml", "--plugin", "walk.py").stderr
+    )
+
+
+def test_an_installed_package_that_is_gone_stops_nobody_who_needs_another(monkeypatch):
+    gone = EntryPoint("gone", "no_such_package.systems:gone", "nlbench.systems")
+    monkeypatch.setattr(installed, "_points", lambda kind: {"gone": gone} if kind == "systems" else {})
+    nb.allow("walk.py")
+    stated = config.load("own.yaml")
+    plugins.forget()
+    plugins.restore(stated.plugins)
+    assert plugins.find("systems", "walk") is not None
+    with pytest.raises(ConfigError, match="no_such_package"):
+        plugins.find("systems", "gone")
