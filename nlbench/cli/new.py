@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
+import ast
+import builtins
 import keyword
 import re
 from enum import StrEnum
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from nlbench.cli import options, output
-from nlbench.errors import ConfigError
+from nlbench.errors import ConfigError, Problem
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
 
 NAME = re.compile(r"[a-z][a-z0-9]*([_-][a-z0-9]+)*")
+BASELINE = "no-filter"  # what any filter should be better than
 # For each kind of system, (discrete, continuous): a simple filter, and one that should be better.
 COMPARED = {
     (False, False): ("linearised-kalman", "third-order-guarded"),
     (True, False): ("ekf", "ukf"),
     (False, True): ("kushner-2", "kushner-3"),
 }
+UNDECIDED = ("ekf", "ukf")  # where the kind depends on parameters that have no default
+NO_TEXT = ("null", "true", "false")  # as a value in YAML
 
 
 class What(StrEnum):
@@ -51,53 +59,101 @@ def new(
         raise ConfigError(f"'{name}': expected a name of a-z 0-9 _ - such as van_der_pol")
     word, dashed = name.replace("-", "_"), name.replace("_", "-")
     if what is What.experiment:
-        worse, better = _compared(system, filters or [])
-        listed = list(dict.fromkeys([worse, better, *(filters or [])]))
-        values = {
-            "NAME": dashed,
-            "SYSTEM": system,
-            "FILTERS": ", ".join(listed),
-            "BETTER": better,
-            "WORSE": worse,
-        }
-        path = Path(f"{word}.yaml")
-    else:
-        _check_free(what, dashed)
-        values = {f"MY_{what.upper()}": word, f"MY-{what.upper()}": dashed}
-        path = Path(f"{word}.py")
-    _write(path, f"{what}{path.suffix}.txt", values)
-    print(f"{path}: written")
-    if what is What.experiment:
-        output.next_step(options.command("run", path, None), "runs it and writes a report")
+        _experiment(Path(f"{word}.yaml"), dashed, system, filters or [])
         return
+    path = Path(f"{word}.py")
+    _check_free(what, word, dashed)
+    _write(path, f"{what}.py.txt", {f"MY_{what.upper()}": word, f"MY-{what.upper()}": dashed})
+    print(f"{path}: written")
     begun = f"nlbench new experiment try-{dashed} --{what} {dashed} --plugin {path}"
     output.next_step(begun, "writes an experiment with it, and says how it is run")
 
 
-def _compared(system: str, filters: list[str]) -> tuple[str, str]:
+def _experiment(path: Path, name: str, system: str, filters: list[str]) -> None:
+    """Write an experiment that is valid, or says what must be written into it first."""
+    from nlbench import systems
+    from nlbench.filters import catalogue
+
+    if name in NO_TEXT:
+        raise ConfigError(f"'{name}': means something else in YAML; choose another name")
+    kind = _kind(system)
+    worse, better = _compared(kind, filters)
+    listed = list(dict.fromkeys([worse, better, *filters]))
+    options_of = [(each, catalogue.options(each, *(kind or ()))) for each in listed]
+    values = {"NAME": name, "SYSTEM": system, "FILTERS": ", ".join(listed), "BETTER": better, "WORSE": worse}
+    values["SYSTEM_NEEDS"] = _needs([(system, systems.parameters(system))])
+    values["FILTERS_NEED"] = _needs(options_of)
+    _write(path, "experiment.yaml.txt", values)
+    print(f"{path}: written")
+    if values["SYSTEM_NEEDS"] or values["FILTERS_NEED"]:
+        validate = options.command("validate", path, None)
+        output.next_step(validate, "says what is missing; write that into the file first")
+    else:
+        output.next_step(options.command("run", path, None), "runs it and writes a report")
+
+
+def _kind(system: str) -> tuple[bool, bool] | None:
+    """The kind of a system; None where parameters without a default decide it. Raises `ConfigError`."""
+    from nlbench import systems
+    from nlbench.checks import known
+
+    model = systems.parameters(known(system, systems.available(), "system"))
+    if any(field.is_required() for field in model.model_fields.values()):
+        return None
+    return systems.kind(system, model().model_dump())
+
+
+def _compared(kind: tuple[bool, bool] | None, filters: list[str]) -> tuple[str, str]:
     """The filters of a claim, the second expected to be better: the user's own, if one was named.
 
-    Raises `ConfigError` for an unknown system or filter.
+    Raises `ConfigError` for a filter that is unknown or not for systems of the kind.
     """
-    from nlbench import systems
     from nlbench.checks import known
     from nlbench.filters import catalogue
 
-    known(system, systems.available(), "system")
+    problems = []
     for each in filters:
         known(each, catalogue.available(), "filter")
-    kind = systems.kind(system, systems.parameters(system)().model_dump())
-    worse, better = COMPARED[kind]
-    return worse, filters[0] if filters else better
+        refused = kind and catalogue.refusal(each, *kind)
+        problems += [Problem(f"'{each}' {refused}", file="--filter")] if refused else []
+    if problems:
+        raise ConfigError(problems)
+    worse, better = COMPARED[kind] if kind else UNDECIDED
+    better = next((each for each in filters if each != BASELINE), better)
+    rows = [catalogue.row(each, *(kind or ())) for each in (worse, better)]
+    alike = len({(row.order, row.update, row.options, row.family) for row in rows}) == 1
+    return BASELINE if alike else worse, better
 
 
-def _check_free(what: What, name: str) -> None:
-    """Raises `ConfigError` for a name that is a built-in system's or filter's."""
+def _needs(named: list[tuple[str, type[BaseModel]]]) -> str:
+    """A comment on what has no default; nothing where all has one."""
+    from nlbench.config.explain import expected
+
+    missing = [
+        f"{name} needs {key} ({expected(field.annotation, tuple(field.metadata))})"
+        for name, model in named
+        for key, field in model.model_fields.items()
+        if field.is_required()
+    ]
+    return f"  # not valid yet: {'; '.join(missing)}" if missing else ""
+
+
+def _check_free(what: What, word: str, dashed: str) -> None:
+    """Raises `ConfigError` for a name of a built-in system or filter, and for one that the skeleton's code uses."""
     from nlbench import systems
     from nlbench.filters.catalogue import FILTERS
 
-    if name in (systems.MODULES if what is What.system else FILTERS):
-        raise ConfigError(f"'{name}' is the name of a built-in {what}; choose another")
+    if dashed in (systems.MODULES if what is What.system else FILTERS):
+        raise ConfigError(f"'{dashed}' is the name of a built-in {what}; choose another")
+    tree = ast.parse(_skeleton(f"{what}.py.txt"))
+    imports = [node for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom))]
+    imported = [alias.asname or alias.name for node in imports for alias in node.names]
+    if word in (*imported, *dir(builtins)):
+        raise ConfigError(f"'{word}' is a name that the code of the skeleton uses; choose another")
+
+
+def _skeleton(name: str) -> str:
+    return files("nlbench").joinpath("skeletons", name).read_text("utf-8")
 
 
 def _write(path: Path, skeleton: str, values: dict[str, str]) -> None:
@@ -106,7 +162,7 @@ def _write(path: Path, skeleton: str, values: dict[str, str]) -> None:
 
     if path.exists() or path.is_symlink():
         raise ConfigError(f"{path}: exists, and is not overwritten; choose another name or folder")
-    text = files("nlbench").joinpath("skeletons", skeleton).read_text("utf-8")
+    text = _skeleton(skeleton)
     for placeholder, value in values.items():
-        text = re.sub(rf"\b{placeholder}\b", value, text)
+        text = re.sub(rf"\b{placeholder}\b", value.replace("\\", r"\\"), text)
     atomic_write(path, text.encode())

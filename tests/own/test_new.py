@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 import nlbench as nb
 from nlbench import config, plugins
 from nlbench.cli.app import app
+from nlbench.cli.new import COMPARED
 
 PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
 
@@ -120,6 +121,15 @@ def test_nothing_is_overwritten(what):
         ("system Upper", "'Upper': expected a name"),
         ("system oscillator", "'oscillator' is the name of a built-in system"),
         ("filter ekf", "'ekf' is the name of a built-in filter"),
+        ("filter gaussian", "'gaussian' is a name that the code of the skeleton uses"),
+        ("filter len", "'len' is a name that the code of the skeleton uses"),
+        ("system nb", "'nb' is a name that the code of the skeleton uses"),
+        ("system jnp", "'jnp' is a name that the code of the skeleton uses"),
+        ("experiment null", "'null': means something else in YAML"),
+        (
+            "experiment x --system schwartz --filter ukf",
+            "--filter: 'ukf' takes measurements at discrete times",
+        ),
         ("experiment x --system osillator", "unknown system 'osillator'; did you mean 'oscillator'?"),
         ("experiment x --filter efk", "unknown filter 'efk'; did you mean 'ekf'?"),
         ("sistem x", "sistem"),
@@ -132,10 +142,35 @@ def test_a_mistake_ends_with_two_and_writes_nothing(line, message):
     assert list(Path().iterdir()) == []
 
 
-@pytest.mark.parametrize("system", ["ungm", "cubic-sensor", "lunar-orbit"])
-def test_an_experiment_takes_filters_that_are_for_its_system(system):
-    assert command(f"nlbench new experiment x --system {system}").exit_code == 0
-    stated = config.load("x.yaml")
-    assert stated.system.name == system
-    assert stated.question.endswith(f"on {system}?")
-    assert [claim.id for claim in stated.claims] == ["C1", "C2"]
+@pytest.mark.parametrize("system", nb.systems.available())
+def test_an_experiment_is_valid_for_every_system_and_compares_different_filters(system):
+    simple, better = COMPARED[nb.systems.kind(system, nb.systems.parameters(system)().model_dump())]
+    chosen = [[], [simple], [better], ["ekf"], ["no-filter"], [simple, "ekf", "no-filter"]]
+    for number, filters in enumerate(chosen):
+        options = "".join(f" --filter {each}" for each in filters)
+        done = command(f"nlbench new experiment try-{number} --system {system}{options}")
+        assert done.exit_code == 0, done.output
+        stated = config.load(f"try_{number}.yaml")
+        assert stated.system.name == system
+        assert stated.question.endswith(f"on {system}?")
+        assert [claim.id for claim in stated.claims] == ["C1", "C2"]
+        assert set(filters) <= set(stated.labels)
+        less = stated.claims[0].less
+        assert less[0] == (filters or [better])[0].replace("no-filter", better)
+        assert set(less) not in ({"ekf", "linearised-kalman"}, {"ekf", "kushner-1"})
+
+
+def test_an_experiment_says_which_parameters_it_still_needs():
+    Path("own.py").write_text(
+        "def decay(rate: float, start: float = 1.0): pass\ndef mine(system, gain: float): pass\n"
+        "SYSTEMS = {'decay': decay}\nFILTERS = {'mine': mine}\n"
+    )
+    line = "nlbench new experiment x --system decay --filter mine --plugin own.py"
+    assert following(line) == "nlbench validate x.yaml --plugin own.py"
+    text = Path("x.yaml").read_text()
+    assert "system: {name: decay}  # not valid yet: decay needs rate (a number)\n" in text
+    assert "filters: [ekf, mine]  # not valid yet: mine needs gain (a number)\n" in text
+    done = command("nlbench validate x.yaml --plugin own.py")
+    assert done.exit_code == 2
+    assert "system.rate: missing; expected a number" in done.stderr
+    assert "filters.1.gain: missing; expected a number" in done.stderr
