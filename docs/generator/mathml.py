@@ -28,7 +28,7 @@ class Displayed(Preprocessor):
 
 
 class Inline(InlineProcessor):
-    """$...$ within a line; a dollar sign before a digit and one after a space are dollars."""
+    """$...$ within a line; one before a space opens no formula and one after a space closes none."""
 
     def handleMatch(self, m: re.Match[str], data: str) -> tuple[str | Element, int, int]:
         return self.md.htmlStash.store(convert(m.group(1))), m.start(0), m.end(0)
