@@ -6,5 +6,5 @@ import re
 
 
 def of_file(name: str) -> str:
-    """The name without characters that mean something in a path, a link or an identifier."""
-    return re.sub(r"[^A-Za-z0-9_.-]", "_", name)
+    """The name without what means something in a path, a link or an identifier; letters of any script stay."""
+    return re.sub(r"[^\w.-]", "_", name)

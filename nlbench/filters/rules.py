@@ -99,7 +99,7 @@ def _clash(name: str, names: Sequence[str], before: Sequence[str]) -> str:
     if beside:
         return f"is that of a column beside '{beside[0]}'"
     same = [other for other in before if of_file(other) == of_file(name)]
-    return f"gives figures the same files as '{same[0]}' (A-Z a-z 0-9 _ . - count)" if same else ""
+    return f"gives figures the same files as '{same[0]}' (letters, digits and _ . - count)" if same else ""
 
 
 def _measured(system: System | DiscreteSystem) -> Iterator[str]:

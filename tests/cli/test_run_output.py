@@ -84,7 +84,9 @@ def test_the_table_has_each_filter_at_the_report_times_with_standard_errors(invo
     done = invoke()
     assert done.exit_code == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert "culver/hermite-01, 25,000 runs, seed 1969" in done.stdout  # more than the file asks for were there
+    assert (
+        "culver/hermite-01, 25,000 runs, seed 1969" in done.stdout
+    )  # more than the file asks for were there
     assert "t = 0.5" in done.stdout
     assert "t = 0.9" not in done.stdout
     rows = [line for line in lines if line.startswith("  third 3 sigma") and "(12)" in line]

@@ -109,6 +109,10 @@ def test_a_name_that_is_no_column_row_or_file_of_its_own_is_said(case):
     assert said.startswith(message)
 
 
+def test_letters_of_any_script_make_names():
+    filters.check(altered(TIMED, coordinates=(nb.Coordinate("θ", "°"), nb.Coordinate("φ", "µm")), norms={}))
+
+
 def test_errors_without_names_have_those_of_the_states():
     assert complaints(altered(TIMED, norms={"x2": (0, 1)})) == [
         "norms: the name 'x2' stands twice; choose another"
