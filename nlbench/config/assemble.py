@@ -31,6 +31,7 @@ from nlbench.suggestions import closest, suggestion
 
 MANDATORY = ("experiment", "system", "filters")
 KEYS = tuple(key for key in Experiment.model_fields if key != "question")
+OPTIONAL = tuple(key for key in KEYS if key not in MANDATORY)  # without a value, as if they were left out
 SECTIONS: dict[str, type[Section]] = {
     "monte_carlo": MonteCarlo,
     "source": Source,
@@ -54,7 +55,7 @@ class Named(Section):
 
 def assemble(raw: Mapping[str, Any], question: str = "") -> tuple[Experiment | None, list[Finding]]:
     """The experiment that the data state, or None, and everything that is wrong with them."""
-    raw = {key: value for key, value in plain(dict(raw)).items() if value is not None or key in MANDATORY}
+    raw = {key: value for key, value in plain(dict(raw)).items() if value is not None or key not in OPTIONAL}
     findings = _unknown_keys(raw)
     parts: dict[str, Any] = {}
     head, wrong = validated(Head, {key: raw[key] for key in Head.model_fields if key in raw})
@@ -86,9 +87,9 @@ def assemble(raw: Mapping[str, Any], question: str = "") -> tuple[Experiment | N
     parts["plugins"], wrong = plugged.used(parts["system"], filters, raw.get("plugins"))
     findings += wrong
     if findings or head is None or reports is None:
-        return None, findings
+        return None, list(dict.fromkeys(findings))  # what a filter believes is looked at twice
     parts["claims"] = [each.model_copy(update={"at": each.at or reports}) for each in claims if each]
-    parts.update(head.model_dump(), report_times=reports, question=question)
+    parts.update(head.model_dump(), report_times=reports, question=_one_line(question))
     return Experiment(**parts), []
 
 
@@ -255,6 +256,11 @@ def _time(
         Finding(("time", "step"), f"time is discrete, so a step is 1, found {time.step:g}; leave it out")
     )
     return time.model_copy(update={"step": 1.0})
+
+
+def _one_line(question: str) -> str:
+    """The question as a comment can hold it."""
+    return "".join(letter if letter.isprintable() else " " for letter in question).strip()
 
 
 def _claims(raw: Mapping[str, Any], findings: list[Finding]) -> list[Claim | None]:

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from nlbench.config.claim import FORMS, Claim
-from nlbench.config.explain import Finding
+from nlbench.config.explain import LARGEST, Finding
 from nlbench.config.schema import FilterSpec, Head, MonteCarlo, Source, SystemSpec, TimeSpec
 from nlbench.suggestions import suggestion
 
 MOST_OUTPUTS = 100_000
 MOST_STEPS = 10**9
+_TOO_MANY_STEPS = f"more than {MOST_STEPS:,} steps; take a longer step"
 
 
 def default_times(system: SystemSpec, given: dict[str, Any], discrete: bool) -> dict[str, float]:
@@ -21,9 +22,9 @@ def default_times(system: SystemSpec, given: dict[str, Any], discrete: bool) -> 
     """
     interval = system.parameters.get("interval") or given.get("output")
     end = given.get("end", 1.0)
-    if not interval and isinstance(end, (int, float)):
+    if not interval and isinstance(end, (int, float)) and abs(end) <= LARGEST:
         interval = 1 if discrete else end / 20
-    if not isinstance(interval, (int, float)) or not interval > 0:
+    if not isinstance(interval, (int, float)) or not 0 < interval <= LARGEST:
         return {}
     return {"end": 20 * interval, "output": interval, "step": 1 if discrete else interval / 10}
 
@@ -54,7 +55,7 @@ def times(
             Finding(("time", "output"), f"more than {MOST_OUTPUTS:,} output times; take a longer spacing")
         )
     if time.end / time.step > MOST_STEPS:
-        findings.append(Finding(("time", "step"), f"more than {MOST_STEPS:,} steps; take a longer step"))
+        findings.append(Finding(("time", "step"), _TOO_MANY_STEPS))
     reports = reports or []
     for index, each in enumerate(reports):
         at = ("report_times", index)
@@ -73,8 +74,11 @@ def times(
                 findings.append(Finding((*path, "interval"), f"{message}; measurement: none says so"))
     for index, spec in enumerate(filters):
         step = spec.options.get("step") if spec else None
-        if step is not None:
-            findings += _multiple(("time", "output"), time.output, f"filters.{index}.step", step)
+        if step is None:
+            continue
+        findings += _multiple(("time", "output"), time.output, f"filters.{index}.step", step)
+        if time.end / step > MOST_STEPS:
+            findings.append(Finding(("filters", index, "step"), _TOO_MANY_STEPS))
     return findings
 
 

@@ -11,6 +11,7 @@ from nlbench.config.nodes import Reader
 from nlbench.config.places import Document, Place
 from nlbench.errors import ConfigError, Problem
 
+LINE_END = re.compile("\r\n|[\r\x85\u2028\u2029]")  # beside \n, where the parser begins another line
 LARGEST_FILE = 200_000
 EDITOR_HINT = re.compile(r"#\s*(!|yaml-language-server|vim?:|-\*-)")
 
@@ -23,10 +24,11 @@ def read(path: str | os.PathLike[str]) -> Document:
 
 def compose(text: str, name: str) -> Document:
     """The document in `text`; `name` is what messages call it. Raises `ConfigError` at errors of syntax."""
+    text = LINE_END.sub("\n", text)
     node = _parsed(text, name)
     lines = text.split("\n")
     first = next((at for at, line in enumerate(lines) if line.strip()[:1] not in ("", "#")), 0)
-    root = Place(name, first + 1, 1, lines[first].rstrip("\r"))
+    root = Place(name, first + 1, 1, lines[first])
     if node is None:
         raise ConfigError(
             [Problem("the file is empty; an experiment needs experiment, system and filters", file=name)]
@@ -103,9 +105,9 @@ def _parsed(text: str, name: str, short: bool = False) -> Any:
         message = f"the character U+{code:04X} is not allowed in YAML"
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        lines = text.split("\n")
+        lines = LINE_END.sub("\n", text).split("\n")
         line = min(mark.line, len(lines) - 1) if mark else 0
-        place = Place(name, line + 1, mark.column + 1 if mark else 1, lines[line].rstrip("\r"))
+        place = Place(name, line + 1, mark.column + 1 if mark else 1, lines[line])
         message = _syntax(error, lines[line])
     except (YAMLError, ValueError, NotImplementedError, AssertionError, IndexError, AttributeError) as error:
         place, message = (

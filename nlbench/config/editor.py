@@ -17,7 +17,9 @@ from nlbench.config.schema import Experiment, Head, Initial, TimeSpec
 from nlbench.filters import catalogue
 
 Schema = dict[str, Any]
-DIGITS = "^[0-9][0-9_]*$"  # 20_000, which YAML 1.2 and so editors read as text
+# 20_000 and 1_000.5, which YAML 1.2 and so editors read as text
+DECIMAL = r"([0-9][0-9_]*(\.[0-9_]*)?|\.[0-9_]+)([eE][-+]?[0-9]+)?"
+DIGITS = f"^[-+]?({DECIMAL}|0b[01_]+|0o[0-7_]+|0x[0-9a-fA-F_]+)$"
 
 
 def json_schema() -> Schema:
@@ -55,7 +57,11 @@ def json_schema() -> Schema:
         "type": "object",
         "additionalProperties": False,
         "required": list(MANDATORY),
-        "properties": {key: properties[key] for key in Experiment.model_fields if key in properties},
+        "properties": {
+            key: properties[key] if key in MANDATORY else _or_null(properties[key])
+            for key in Experiment.model_fields
+            if key in properties
+        },
     }
     return _with_digits(schema)
 
@@ -123,6 +129,14 @@ def _options(names: Iterable[str]) -> Iterable[tuple[str, type[BaseModel]]]:
     for name in names:
         for kind in catalogue.takes(name):
             yield name, catalogue.options(name, *kind)
+
+
+def _or_null(schema: Schema) -> Schema:
+    """What may stand in the file without a value, as if it were left out."""
+    if "type" in schema:
+        return {**schema, "type": [schema["type"], "null"]}
+    members = [each for each in schema["anyOf"] if each != {"type": "null"}]
+    return {**schema, "anyOf": [*members, {"type": "null"}]}
 
 
 def _with_digits(schema: Any) -> Any:

@@ -15,6 +15,8 @@ from nlbench.config.places import Path
 from nlbench.suggestions import closest, suggestion
 
 Model = TypeVar("Model", bound=BaseModel)
+# Magnitudes of numbers other than 0, so that squares, cubes and quotients of them stay in double precision.
+SMALLEST, LARGEST = 1e-100, 1e100
 KINDS = {int: "a whole number", float: "a number", str: "text", bool: "true or false", type(None): "null"}
 
 
@@ -36,10 +38,15 @@ def validated(model: type[Model], raw: Any, at: Path = ()) -> tuple[Model | None
             Finding(at, f"expected a mapping ({', '.join(model.model_fields)}), found {found(raw)}")
         ]
     raw = plain(raw)
+    findings: list[Finding] = []
+    instance = None
     try:
-        return model.model_validate_json(json.dumps(raw), strict=True), []
+        instance = model.model_validate_json(json.dumps(raw), strict=True)
     except ValidationError as error:
-        return None, [each._replace(path=(*at, *each.path)) for each in _findings(model, raw, error)]
+        findings += _findings(model, raw, error)
+    told = {each.path for each in findings}
+    findings += [each for each in _extremes(raw, ()) if each.path not in told]
+    return None if findings else instance, [each._replace(path=(*at, *each.path)) for each in findings]
 
 
 def plain(value: Any) -> Any:
@@ -176,6 +183,21 @@ _SHAPES = {
     *("greater_than", "greater_than_equal", "less_than", "less_than_equal", "list_type", "tuple_type"),
     *("too_short", "too_long", "dict_type", "model_type", "model_attributes_type", "none_required"),
 }
+
+
+def _extremes(value: Any, path: Path) -> Iterator[Finding]:
+    """Finite numbers too large or too small to be computed with."""
+    if isinstance(value, (dict, list)):
+        for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _extremes(item, (*path, key))
+    elif _is_number(value) and value != 0 and not SMALLEST <= abs(value) <= LARGEST:
+        magnitudes = f"from {SMALLEST:g} to {LARGEST:g} in magnitude"
+        yield Finding(path, f"expected 0 or a number {magnitudes}, found {found(value)}")
+
+
+def _is_number(value: Any) -> bool:
+    """Whether it is an integer, of any length, or a finite float."""
+    return isinstance(value, int) or (isinstance(value, float) and math.isfinite(value))
 
 
 def _path(loc: tuple[str | int, ...], raw: Any, missing: bool) -> Path:

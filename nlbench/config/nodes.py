@@ -11,6 +11,7 @@ from nlbench.errors import ConfigError, Problem
 MOST_VALUES = 20_000
 DEEPEST = 24
 TAG = "tag:yaml.org,2002:"
+MOST_DIGITS = 1000  # of an integer; Python writes none of more than 4,300
 INTEGRAL = 2**53  # from here on a float does not tell one integer from the next
 
 
@@ -33,11 +34,16 @@ class Reader:
         if path:
             self.document.values[path] = self._place(node)
         kind = node.tag.removeprefix(TAG)
-        if kind == "map" and isinstance(node.value, list):
+        if (node.id, kind) == ("mapping", "map"):
             return dict(self._items(node, path))
-        if kind == "seq" and isinstance(node.value, list):
+        if (node.id, kind) == ("sequence", "seq"):
             return [self.plain(item, (*path, index)) for index, item in enumerate(node.value)]
-        if not isinstance(node.value, str) or kind not in _SCALARS:
+        return self._scalar(node, path)
+
+    def _scalar(self, node: Any, path: Path) -> Any:
+        """A word or number of a tag that plain values have; anything else is refused."""
+        kind = node.tag.removeprefix(TAG)
+        if node.id != "scalar" or kind not in _SCALARS:
             self._refuse(node, path, f"the tag '{_tag(node.tag)}' is not allowed; write plain values")
             return None
         try:
@@ -52,10 +58,11 @@ class Reader:
     def _items(self, node: Any, path: Path) -> Iterator[tuple[str, Any]]:
         seen: dict[str, Place] = {}
         for key, value in node.value:
-            if not isinstance(key.value, str):
+            if key.id != "scalar":
                 self._refuse(key, path, "a key must be a word")
                 continue
             here = (*path, key.value)
+            self._scalar(key, here)
             if key.value in seen:
                 again = f" (first in line {seen[key.value].line})" if seen[key.value].line else ""
                 self._refuse(key, here, f"the key '{key.value}' stands twice{again}")
@@ -70,7 +77,7 @@ class Reader:
         if self.lines is None:
             return Place(self.name)
         line, column = node.start_mark.line, node.start_mark.column
-        shown = self.lines[line].rstrip("\r") if line < len(self.lines) else None
+        shown = self.lines[line] if line < len(self.lines) else None
         return Place(self.name, line + 1, column + 1, shown)
 
 
@@ -81,6 +88,8 @@ def _tag(tag: str) -> str:
 def _whole(text: str) -> int:
     text = text.replace("_", "").lower()
     digits = text.lstrip("+-")
+    if len(digits) > MOST_DIGITS:
+        raise ValueError(text)
     return int(text, 0) if digits[:2] in ("0x", "0o", "0b") else int(text)
 
 

@@ -6,8 +6,11 @@ import re
 from typing import Any, NamedTuple
 
 from nlbench.config.document import value_of
+from nlbench.config.nodes import DEEPEST
 from nlbench.config.places import Document, Path, Place, dotted
 from nlbench.errors import ConfigError, Problem
+
+LONGEST_KEY = 60  # of which a message shows all
 
 
 class Override(NamedTuple):
@@ -25,7 +28,8 @@ def parse(text: str) -> Override:
         raise ConfigError(
             [Problem("expected key=value, such as monte_carlo.runs=1e5", file=f"--set {text[:60]}")]
         )
-    return Override(key.strip(), value, f"--set {key.strip()}")
+    key = key.strip()
+    return Override(key, value, f"--set {key if len(key) <= LONGEST_KEY else key[:LONGEST_KEY] + ' ...'}")
 
 
 def apply(document: Document, overrides: list[Override]) -> None:
@@ -34,6 +38,9 @@ def apply(document: Document, overrides: list[Override]) -> None:
     for override in overrides:
         path = tuple(_part(part) for part in re.split(r"[.\[]", override.key))
         place = Place(override.option)
+        if len(path) > DEEPEST:
+            problems.append(place.problem(path[:4], "nested too deeply"))
+            continue
         try:
             value = value_of(override.text, override.option)
             path = _put(document, path, value)
@@ -49,7 +56,7 @@ def apply(document: Document, overrides: list[Override]) -> None:
 
 def _part(text: str) -> str | int:
     text = text.strip().removesuffix("]")
-    return int(text) if text.isascii() and text.isdigit() else text
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 10 else text
 
 
 def _put(document: Document, path: Path, value: Any) -> Path:

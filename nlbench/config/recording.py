@@ -208,9 +208,17 @@ def _wrong_order(text: str, time: float, before: str, last: float, line: int) ->
     """What is wrong with a time after the one, `before`, that is `last` as a number and stands in that line."""
     if time < last:
         return f"{text} comes after {before} of line {line}; times must not descend"
-    if time == last and text != before and Decimal(text) != Decimal(before):
+    if time == last and text != before and not _equal(text, before):
         return f"{text} and {before} of line {line} are one number in double precision; subtract a start from all"
     return ""
+
+
+def _equal(text: str, before: str) -> bool:
+    """Whether both state one number; not where an exponent is beyond what a decimal holds."""
+    try:
+        return Decimal(text) == Decimal(before)
+    except ArithmeticError:
+        return False
 
 
 def _shown(text: str) -> str:

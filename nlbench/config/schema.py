@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
 from nlbench import runtime
 from nlbench.config.claim import Claim
-from nlbench.config.fields import Bound, Finite, Fraction, Label, Name, Positive, RunNumber, Section
+from nlbench.config.fields import (
+    Bound,
+    Finite,
+    Fraction,
+    Label,
+    Name,
+    NotNegative,
+    Positive,
+    RunNumber,
+    Section,
+)
 from nlbench.config.identity import canonical_hash, to_yaml
 
 LARGEST = 2**63 - 1
@@ -114,7 +125,7 @@ class Initial(Section):
 
     mean: Finite | list[Finite] | None = Field(default=None, description="of the state")
     cov: list[list[Finite]] | None = Field(default=None, description="covariance, symmetric, as rows")
-    variance: Annotated[float, Field(ge=0)] | list[Annotated[float, Field(ge=0)]] | None = Field(
+    variance: NotNegative | list[NotNegative] | None = Field(
         default=None, description="the diagonal of the covariance, instead of it"
     )
 
@@ -134,7 +145,9 @@ class Initial(Section):
         pairs = [(i, j) for i in range(size) for j in range(i + 1)]
         if any(cov[i][j] != cov[j][i] for i, j in pairs):
             raise ValueError("cov must be symmetric")
-        if any(cov[i][j] ** 2 > cov[i][i] * cov[j][j] * (1 + 1e-9) or cov[i][i] < 0 for i, j in pairs):
+        if any(row[i] < 0 for i, row in enumerate(cov)) or any(
+            abs(cov[i][j]) > math.sqrt(cov[i][i]) * math.sqrt(cov[j][j]) * (1 + 1e-9) for i, j in pairs
+        ):
             raise ValueError("cov must be positive semidefinite")
         return self
 
@@ -177,7 +190,7 @@ class Source(Section):
     document: str | None = Field(default=None, description="the publication, such as culver-1969")
     figures: list[str] = Field(default_factory=list, description="numbers of its figures, such as '7.18'")
     tables: list[str] = Field(default_factory=list, description="numbers of its tables")
-    runs: int | None = Field(default=None, ge=1, description="the source's number of runs")
+    runs: int | None = Field(default=None, ge=1, le=LARGEST, description="the source's number of runs")
 
 
 class EngineSpec(Section):

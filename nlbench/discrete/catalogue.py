@@ -27,7 +27,7 @@ class GaussianOptions(Options):
 class IteratedOptions(GaussianOptions):
     """Options of the iterated filter."""
 
-    iterations: PositiveInt = Field(default=5, description="Gauss-Newton iterations of an update")
+    iterations: PositiveInt = Field(default=5, le=10_000, description="Gauss-Newton iterations of an update")
 
 
 class UnscentedOptions(GaussianOptions):
@@ -43,14 +43,14 @@ class UnscentedOptions(GaussianOptions):
 class QuadratureOptions(GaussianOptions):
     """Options of a filter that integrates by Gauss-Hermite quadrature."""
 
-    points: PositiveInt = Field(default=3, ge=2, description="nodes per dimension")
+    points: PositiveInt = Field(default=3, ge=2, le=1000, description="nodes per dimension")
 
 
 class MixtureOptions(GaussianOptions):
     """Options of the Gaussian sum."""
 
     components: PositiveInt = Field(
-        default=3, description="Gaussians per dimension that the prior is laid out as"
+        default=3, le=1000, description="Gaussians per dimension that the prior is laid out as"
     )
     bank: Literal["ekf", "sof-gaussian"] = Field(default="ekf", description="filter of each Gaussian")
     spread: float = Field(
@@ -73,13 +73,13 @@ class MixtureOptions(GaussianOptions):
 class EnsembleOptions(Options):
     """Options of the ensemble Kalman filter."""
 
-    particles: PositiveInt = Field(default=100, ge=2, description="members of the ensemble")
+    particles: PositiveInt = Field(default=100, ge=2, le=10_000_000, description="members of the ensemble")
 
 
 class ParticleOptions(Options):
     """Options of the particle filter."""
 
-    particles: PositiveInt = Field(default=1000, ge=2, description="number of particles")
+    particles: PositiveInt = Field(default=1000, ge=2, le=10_000_000, description="number of particles")
     threshold: float = Field(
         default=0.5, ge=0.0, le=1.0, description="resample when fewer than this share of particles count"
     )

@@ -46,7 +46,7 @@ def nees(data: Data) -> Iterator[Picture]:
         _draw(axes, data, panel)
     title = f"{' and '.join(SCORES[panel.score] for panel in panels)}, {data.runs:,} runs"
     style.literal(drawn[0].set_title(style.wrapped(title)))
-    drawn[-1].set_xlabel(style.with_unit("time", data.units["time"]))
+    style.literal(drawn[-1].set_xlabel(style.with_unit("time", data.units["time"])))
     looks = style.looks(data.filters, data.reference)
     entries = {label: Line2D([], [], **style.key(looks[label])) for label in data.filters}
     style.legend(figure, {**entries, BOUNDS_WORDS: Patch(**BOUNDS)})

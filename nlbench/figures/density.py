@@ -93,10 +93,9 @@ def _picture(data: Data, coordinate: str, time: float, samples: Samples) -> Pict
     for axes in grid.flat[max(0, len(samples) - columns) : len(samples)]:
         axes.tick_params(labelbottom=True)
     unit, error = data.units[coordinate], f"error of {style.short(coordinate)}"
+    inverse = f"1/{unit}" if unit.isalnum() else f"1/({unit})" if unit else ""
     for axes in grid[:, 0]:
-        axes.set_ylabel(
-            style.with_unit("density", f"1/{unit}" if unit.isalnum() else f"1/({unit})" if unit else "")
-        )
+        style.literal(axes.set_ylabel(style.with_unit("density", inverse)))
     for axes in grid[-1]:
         style.literal(axes.set_xlabel(style.with_unit(error, unit)))
     kept = max(len(sample.error) + sample.lost + sample.improper for sample in samples.values())

@@ -114,7 +114,7 @@ def _finish(figure: Figure, top: Axes, bottom: Axes, subject: Subject) -> None:
     data = subject.data
     style.literal(top.set_title(style.wrapped(subject.title)))
     style.literal(top.set_ylabel(style.with_unit(subject.words, data.units.get(subject.coordinate, ""))))
-    bottom.set_xlabel(style.with_unit("time", data.units["time"]))
+    style.literal(bottom.set_xlabel(style.with_unit("time", data.units["time"])))
     looks = style.looks(data.filters, data.reference)
     entries = {label: Line2D([], [], **style.key(looks[label])) for label in data.filters}
     if _bound(subject) is not None:

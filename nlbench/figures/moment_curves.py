@@ -65,9 +65,10 @@ def _panels(name: str, data: Data, coordinate: str, moment: Moment) -> Picture:
     for axes in grid.flat[max(0, len(data.filters) - columns) : len(data.filters)]:
         axes.tick_params(labelbottom=True)
     for axes in grid[:, 0]:
-        axes.set_ylabel(style.with_unit(moment.words, data.units.get(coordinate, ""), moment.power))
+        words = style.with_unit(moment.words, data.units.get(coordinate, ""), moment.power)
+        style.literal(axes.set_ylabel(words))
     for axes in grid[-1]:
-        axes.set_xlabel(style.with_unit("time", data.units["time"]))
+        style.literal(axes.set_xlabel(style.with_unit("time", data.units["time"])))
     words = f"{moment.words} of {style.short(coordinate)}"
     title = f"Estimated and actual {words}, {data.runs:,} runs"
     _finish(figure, data, title)

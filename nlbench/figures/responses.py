@@ -44,9 +44,10 @@ def _run(data: Data, number: int, rows: pd.DataFrame) -> Picture:
         style.literal(axes.set_ylabel(words))
     for axes, (name, each) in zip(panels[len(states) :], measurements, strict=True):
         axes.plot(each["time"], each["value"], **MEASURED)
-        axes.set_ylabel(f"measurement\n{name}" if len(measurements) > 1 else "measurement")
+        words = f"measurement\n{name}" if len(measurements) > 1 else "measurement"
+        style.literal(axes.set_ylabel(words))
     figure.align_ylabels(panels)
-    panels[-1].set_xlabel(style.with_unit("time", data.units["time"]))
+    style.literal(panels[-1].set_xlabel(style.with_unit("time", data.units["time"])))
     title = f"Truth, estimates and measurements in run {number:,}"
     if not measurements:
         title = f"Truth and estimates in run {number:,}"

@@ -58,7 +58,7 @@ def _run(data: Data, number: int, paths: Paths) -> Picture:
         words = style.with_unit(style.short(coordinate, 16), data.units.get(coordinate, ""))
         style.literal(axes.set_ylabel(f"error of\n{words}"))
     figure.align_ylabels(panels)
-    panels[-1].set_xlabel(style.with_unit("time", data.units["time"]))
+    style.literal(panels[-1].set_xlabel(style.with_unit("time", data.units["time"])))
     title = f"Errors in run {number:,}"
     style.literal(panels[0].set_title(style.wrapped(title)))
     looks = style.looks(data.filters, data.reference)

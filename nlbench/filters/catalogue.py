@@ -51,7 +51,7 @@ class CurvedOptions(Options):
 class TemperingOptions(CurvedOptions):
     """Options of the integration update."""
 
-    steps: PositiveInt = Field(default=5, description="RK4 steps in pseudo-time")
+    steps: PositiveInt = Field(default=5, le=100_000, description="RK4 steps in pseudo-time")
     measurement: Literal["linear", "quadratic"] = Field(
         default="linear", description="expand the measurement to first or to second order"
     )
@@ -60,7 +60,7 @@ class TemperingOptions(CurvedOptions):
 class TwoStepOptions(CurvedOptions):
     """Options of the two-step updates."""
 
-    steps: PositiveInt = Field(default=10, description="RK4 steps in pseudo-time")
+    steps: PositiveInt = Field(default=10, le=100_000, description="RK4 steps in pseudo-time")
     closure: Literal["quasi-moment", "cumulant"] | None = Field(
         default=None,
         description="of fifth and sixth moments; default: quasi-moment if corrected, cumulant if printed",
@@ -70,13 +70,15 @@ class TwoStepOptions(CurvedOptions):
 class DirectOptions(CurvedOptions):
     """Options of direct numerical integration."""
 
-    points: int = Field(default=51, ge=3, description="points per dimension, over 17 prior sigmas")
+    points: int = Field(
+        default=51, ge=3, le=100_000, description="points per dimension, over 17 prior sigmas"
+    )
 
 
 class QuadratureOptions(CurvedOptions):
     """Options of Gauss-Hermite quadrature."""
 
-    points: int = Field(default=9, ge=3, description="nodes per dimension")
+    points: int = Field(default=9, ge=3, le=1000, description="nodes per dimension")
 
 
 class GuardedOptions(Options):

@@ -96,7 +96,7 @@ def table(f: Filter, followed: Followed, measurements: Sequence[str] | None = No
 
     m = followed.innovation.shape[1]
     names = list(measurements or _numbered("y", m))
-    if len(set(names)) != m:
+    if len(names) != m or len(set(names)) != m:
         raise ConfigError(f"measurements: expected {m} different names, got {', '.join(map(str, names))}")
     columns: dict[str, Any] = {"time": followed.times}
     for i, name in enumerate(_state_names(f)):

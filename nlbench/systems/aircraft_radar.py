@@ -53,10 +53,12 @@ class Parameters(BaseModel):
     )
     drag_area: float = Field(default=5e-5, ge=0.0, description="drag coefficient times area per mass, m^2/kg")
     thrust: float = Field(default=0.544, ge=0.0, description="thrust per mass while the engines run, m/s^2")
-    thrust_steps: int = Field(default=40, ge=0, description="steps for which the engines run")
+    thrust_steps: int = Field(
+        default=40, ge=0, le=1_000_000_000, description="steps for which the engines run"
+    )
     level_acceleration: float = Field(default=0.5, ge=0.0, description="unknown, level, on each axis, m/s^2")
     vertical_acceleration: float = Field(default=0.1, ge=0.0, description="unknown, vertical, m/s^2")
-    interval: int = Field(default=1, ge=1, description="steps between measurements")
+    interval: int = Field(default=1, ge=1, le=1_000_000_000, description="steps between measurements")
 
 
 def build(parameters: Parameters) -> DiscreteSystem:

@@ -50,7 +50,7 @@ class Parameters(BaseModel):
     position_variance: float = Field(default=0.1, gt=0.0, description="that filters start from, each axis")
     velocity_variance: float = Field(default=10.0, gt=0.0, description="that filters start from, each axis")
     turn_deviation: float = Field(default=0.01, ge=0.0, description="noise of the rate of turn, rad/s")
-    interval: int = Field(default=1, ge=1, description="steps between measurements")
+    interval: int = Field(default=1, ge=1, le=1_000_000_000, description="steps between measurements")
 
 
 def build(parameters: Parameters) -> DiscreteSystem:

@@ -37,7 +37,7 @@ class Parameters(BaseModel):
     process_variance: float = Field(default=1.0, gt=0.0, description="variance of w")
     measurement_variance: float = Field(default=1.0, gt=0.0, description="variance of v")
     initial_variance: float = Field(default=1.0, gt=0.0, description="variance that filters start from")
-    interval: int = Field(default=1, ge=1, description="steps between measurements")
+    interval: int = Field(default=1, ge=1, le=1_000_000_000, description="steps between measurements")
 
 
 def build(parameters: Parameters) -> DiscreteSystem:

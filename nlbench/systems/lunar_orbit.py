@@ -79,7 +79,7 @@ CASES = {
 class InitialError(BaseModel):
     """A true initial state at a fixed distance from the mean."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     sigma: float = Field(gt=0.0, description="error of each state, in standard deviations")
     pattern: str = Field(
@@ -92,7 +92,7 @@ class InitialError(BaseModel):
 class Parameters(BaseModel):
     """Parameters of `lunar-orbit`."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     case: Literal["100-mile", "500-mile"] = Field(
         default="100-mile", description="which orbit, with its variances, sightings and step"
@@ -114,8 +114,12 @@ class Parameters(BaseModel):
     measurement_variance: float | None = Field(
         default=None, gt=0.0, description="variance of a sighting, rad^2; default: that of the case"
     )
-    length_unit: float = Field(default=1.0, gt=0.0, description="unit of length of states and errors, ft")
-    time_unit: float = Field(default=1.0, gt=0.0, description="unit of time of the whole experiment, s")
+    length_unit: float = Field(
+        default=1.0, ge=1e-12, le=1e12, description="unit of length of states and errors, ft"
+    )
+    time_unit: float = Field(
+        default=1.0, ge=1e-12, le=1e12, description="unit of time of the whole experiment, s"
+    )
 
 
 def build(parameters: Parameters) -> System:

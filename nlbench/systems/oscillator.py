@@ -49,7 +49,7 @@ WIDE_GRID_POINTS, GRID_REACH = 256, 6.0  # where it is normal, and how many stan
 class Parameters(BaseModel):
     """Parameters of `oscillator`."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     ensemble: Literal["matched", "normal", "thesis-sets"] = Field(
         default="matched", description="how damping ratios are drawn"

@@ -54,7 +54,7 @@ class Parameters(BaseModel):
     )
     process_variance: float = Field(default=1.0, gt=0.0, description="variance of xi")
     measurement_variance: float = Field(default=1.0, gt=0.0, description="variance of theta")
-    interval: int = Field(default=1, ge=1, description="steps between measurements")
+    interval: int = Field(default=1, ge=1, le=1_000_000_000, description="steps between measurements")
 
 
 def build(parameters: Parameters) -> DiscreteSystem:

@@ -37,7 +37,7 @@ class Parameters(BaseModel):
     coefficient: float = Field(default=0.8, gt=-1.0, lt=1.0, description="a, of the signal")
     detector_variance: float = Field(default=0.1, ge=0.0, description="Q2, noise of the square")
     measurement_variance: float = Field(default=2.0, gt=0.0, description="variance of the measurement noise")
-    interval: int = Field(default=1, ge=1, description="steps between measurements")
+    interval: int = Field(default=1, ge=1, le=1_000_000_000, description="steps between measurements")
 
 
 def build(parameters: Parameters) -> DiscreteSystem:

@@ -49,7 +49,7 @@ class Parameters(BaseModel):
         default=1e-6, ge=0.0, description="of the noise that filters assume on x5, per step"
     )
     drag_variance: float = Field(default=1.0, gt=0.0, description="variance of x5 that filters start from")
-    interval: int = Field(default=1, ge=1, description="steps between measurements")
+    interval: int = Field(default=1, ge=1, le=1_000_000_000, description="steps between measurements")
 
 
 def build(parameters: Parameters) -> DiscreteSystem:

@@ -49,7 +49,7 @@ class Parameters(BaseModel):
     wavelength: float = Field(default=1.0, gt=0.0, description="L, of the ripple")
     process_variance: float = Field(default=0.1, gt=0.0, description="variance of w")
     measurement_variance: float = Field(default=0.04, gt=0.0, description="variance of v")
-    interval: int = Field(default=1, ge=1, description="steps between measurements")
+    interval: int = Field(default=1, ge=1, le=1_000_000_000, description="steps between measurements")
 
 
 def build(parameters: Parameters) -> DiscreteSystem:

@@ -58,7 +58,7 @@ class Parameters(BaseModel):
     acceleration: float = Field(default=0.01, ge=0.0, description="unknown, on each axis, m/s^2")
     position_deviation: float = Field(default=20e3, gt=0.0, description="at the start, on each axis, m")
     velocity_deviation: float = Field(default=20.0, gt=0.0, description="at the start, on each axis, m/s")
-    interval: int = Field(default=1, ge=1, description="steps between measurements")
+    interval: int = Field(default=1, ge=1, le=1_000_000_000, description="steps between measurements")
 
 
 def build(parameters: Parameters) -> DiscreteSystem:

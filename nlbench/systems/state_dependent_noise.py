@@ -39,7 +39,7 @@ class Parameters(BaseModel):
     base: float = Field(default=1.0, gt=0.0, description="b0, variance of the disturbance at x = 0")
     growth: float = Field(default=0.3, ge=0.0, description="b1, its growth with x^2")
     measurement_variance: float = Field(default=2.0, gt=0.0, description="variance of the measurement noise")
-    interval: int = Field(default=1, ge=1, description="steps between measurements")
+    interval: int = Field(default=1, ge=1, le=1_000_000_000, description="steps between measurements")
 
 
 def build(parameters: Parameters) -> DiscreteSystem:

@@ -59,8 +59,10 @@ class Parameters(BaseModel):
     own_course: float = Field(
         default=60.0, ge=-180.0, le=180.0, description="of its legs to the x axis, + and - in turn, degrees"
     )
-    leg: int = Field(default=20, ge=1, description="steps from one turn of the own ship to the next")
-    interval: int = Field(default=1, ge=1, description="steps between measurements")
+    leg: int = Field(
+        default=20, ge=1, le=1_000_000_000, description="steps from one turn of the own ship to the next"
+    )
+    interval: int = Field(default=1, ge=1, le=1_000_000_000, description="steps between measurements")
 
 
 def build(parameters: Parameters) -> DiscreteSystem:

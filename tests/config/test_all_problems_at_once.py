@@ -18,6 +18,7 @@ monte_carlo:
 filters:
   - {name: efk}
 """
+HUGE = "9" * 400
 
 
 def complaint(folder: Path, text: str, *overrides: str) -> str:
@@ -99,6 +100,29 @@ def test_a_missing_section_is_told_with_the_other_problems(tmp_path):
         ("[third-order-guarded,", "[third-order,", "no filter is labelled 'third-order'; did you mean"),
         ("statistic: rms_clipped", "statistic: rmse", "did you mean 'rms'?"),
         ("output: 0.1", "output: 1e-9", "time.output: more than 100,000 output times"),
+        (
+            "step: 0.02",
+            "step: 1e-320",
+            "time.step: expected 0 or a number from 1e-100 to 1e+100 in magnitude",
+        ),
+        ("limiter: 3", "step: 1e-320", "filters.1.step: expected 0 or a number from 1e-100 to 1e+100"),
+        ("limiter: 3", "step: 1e-50", "filters.1.step: more than 1,000,000,000 steps; take a longer step"),
+        (
+            "limiter: 3",
+            "limiter: -1e200",
+            "filters.1.limiter: expected a number above 0 or null, found -1e+200",
+        ),
+        (
+            "end: 2.0, step: 0.02, output: 0.1",
+            f"end: {HUGE}",
+            "time.end: expected a number above 0, found 999",
+        ),
+        (
+            "runs: 80",
+            f"runs: {HUGE}",
+            "source.runs: expected a whole number from 1 to 9,223,372,036,854,775,807",
+        ),
+        ("reference: exact\n", "reference: exact\ncliams:\n", "cliams: unknown key; did you mean 'claims'?"),
     ],
 )
 def test_each_mistake_is_explained(tmp_path, old, new, message):
@@ -144,6 +168,8 @@ def test_what_a_filter_believes_and_the_truth_are_checked_like_the_system(tmp_pa
     ("initial", "message"),
     [
         ("{cov: [[1, 2], [2, 1]]}", "cov must be positive semidefinite"),
+        ("{cov: [[1e80, 2e80], [2e80, 1e80]]}", "cov must be positive semidefinite"),
+        ("{cov: [[1, 0], [0, -1]]}", "cov must be positive semidefinite"),
         ("{cov: [[1, 0.5], [0, 1]]}", "cov must be symmetric"),
         ("{cov: [[1, 0]]}", "cov must be square"),
         ("{mean: [1, 2], variance: 1}", "mean has 2 entries but the covariance 1"),
@@ -152,6 +178,20 @@ def test_what_a_filter_believes_and_the_truth_are_checked_like_the_system(tmp_pa
 )
 def test_initial_moments_must_be_moments(tmp_path, initial, message):
     assert f"initial: {message}" in complaint(tmp_path, f"{VALID}initial: {initial}\n")
+
+
+@pytest.mark.parametrize("text", [VALID, spoiled("limiter: 3", "initial: {variance: 1e200}")])
+@pytest.mark.parametrize(("variance", "told"), [(".inf", "found .inf"), ("1e200", "found 1e+200")])
+def test_a_variance_is_a_number_to_compute_with(tmp_path, text, variance, told):
+    said = complaint(tmp_path, f"{text}initial: {{variance: {variance}}}\n")
+    assert f"{told}\n    initial" in said
+    assert ("filters.1.initial.variance: expected" in said) == (text != VALID)
+
+
+@pytest.mark.parametrize("output", ["output", "end"])
+def test_a_time_of_hundreds_of_digits_sets_no_other(tmp_path, output):
+    text = f"experiment: x\nsystem: lunar-orbit\nfilters: [ekf]\ntime: {{{output}: {HUGE}}}\n"
+    assert f"time.{output}: expected a number above 0, found 999" in complaint(tmp_path, text)
 
 
 @pytest.mark.parametrize(
@@ -178,6 +218,15 @@ def test_an_option_of_the_command_line_is_named_as_the_place(tmp_path):
     text = complaint(tmp_path, VALID, "monte_carlo.run=5", "time.step=-1")
     assert "--set monte_carlo.run: unknown key; did you mean 'runs'?" in text
     assert "--set time.step: expected a number above 0, found -1" in text
+
+
+@pytest.mark.parametrize(
+    "key", ["9" * 5000, f"filters.{'9' * 5000}", "a." * 5000 + "a", "time." + "b" * 5000]
+)
+def test_an_option_of_thousands_of_characters_is_told_in_one_line(tmp_path, key):
+    text = complaint(tmp_path, VALID, f"{key}=1")
+    assert text.startswith(f"--set {key[:60]} ...: ")
+    assert len(text) < 1000
 
 
 def test_data_without_a_file_are_told_by_their_path():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from nlbench.config import load
+from nlbench.config import from_dict, load
 from tests.example import VALID, spoiled, written
 
 
@@ -21,6 +21,21 @@ def test_the_resolved_file_loads_as_the_same_experiment(tmp_path):
     assert again.traces == [5, 0]
     assert again.hash12() == experiment.hash12()
     assert again.resolved_yaml() == experiment.resolved_yaml()
+
+
+@pytest.mark.parametrize("question", ["q\rexperiment: t", "q\nfilters: []", "a\x85b\u2028c\td", "\u202eq"])
+def test_a_question_is_one_line_of_the_resolved_file(tmp_path, question):
+    plain = {"experiment": "t", "system": "culver-scalar", "filters": ["ekf"]}
+    experiment = from_dict(plain, question)
+    assert load(written(tmp_path, experiment.resolved_yaml(), "config.resolved.yaml")) == experiment
+    assert experiment.question.isprintable()
+
+
+def test_a_file_whose_lines_end_in_carriage_returns_is_resolved_as_another_is(tmp_path):
+    text = "# q\nexperiment: t\nsystem: culver-scalar\nfilters: [ekf]\n"
+    experiment = loaded(tmp_path, text.replace("\n", "\r"))
+    assert experiment == loaded(tmp_path, text)
+    assert loaded(tmp_path, experiment.resolved_yaml()) == experiment
 
 
 TUNING = (

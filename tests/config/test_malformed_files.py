@@ -36,6 +36,16 @@ MALFORMED = {
     ),
     "an own tag": ("experiment: !run x\n", "the tag '!run' is not allowed"),
     "a binary tag": ("experiment: !!binary aGVsbG8=\n", "the tag '!!binary' is not allowed"),
+    "a list's tag on a mapping": (
+        "filters: !!seq {a: 1}\n",
+        "fig.yaml:1:10: filters: the tag '!!seq' is not allowed; write plain values",
+    ),
+    "a mapping's tag on a list": (
+        "system: !!map [a, b]\n",
+        "fig.yaml:1:9: system: the tag '!!map' is not allowed; write plain values",
+    ),
+    "a tag on a key": ("!evil experiment: x\n", "fig.yaml:1:1: experiment: the tag '!evil' is not allowed"),
+    "a wrong tag on a key": ("!!int experiment: x\n", "cannot read 'experiment' as a number"),
     "a wrong tag": ("experiment: !!int x\n", "fig.yaml:1:13: experiment: cannot read 'x' as a number"),
     "an unknown alias": ("experiment: *x\n", "fig.yaml:1:13: not valid YAML: found undefined alias 'x'"),
     "a list as key": ("? [1, 2]\n: 3\n", "fig.yaml:1:3: a key must be a word"),
@@ -43,6 +53,7 @@ MALFORMED = {
     "an alias of itself": ("a: &a [*a]\n", "nested too deeply"),
     "deep": ("a: " + "[" * 500 + "\n", "nested too deeply"),
     "a huge number": (spoiled("seed: 1969", f"seed: {'9' * 5000}"), "as a number"),
+    "a huge hexadecimal number": (spoiled("seed: 1969", f"seed: 0x{'f' * 4000}"), "as a number"),
     "a control character": ("experiment: \a\n", "fig.yaml:1:13: the character U+0007 is not allowed in YAML"),
     "zeros": (b"\0" * 100, "fig.yaml: a binary file"),
     "latin": (b"# caf\xe9\nexperiment: x\n", "fig.yaml:1:6: not text in UTF-8"),
@@ -79,6 +90,18 @@ def test_control_characters_of_a_file_do_not_reach_the_terminal(tmp_path):
     with pytest.raises(ConfigError) as caught:
         load(written(tmp_path, spoiled("ensemble: matched", 'ensemble: "\\e[31m\\a", x\u0085: 1')))
     assert all(letter.isprintable() or letter == "\n" for letter in str(caught.value))
+
+
+@pytest.mark.parametrize("end", ["\r", "\r\n", "\x85", "\u2028", "\u2029"])
+def test_lines_are_counted_however_they_end(tmp_path, end):
+    text = spoiled("seed: 1969", "seeed: 1")
+    with pytest.raises(ConfigError) as caught:
+        load(written(tmp_path, text.replace("\n", end)))
+    (problem,) = caught.value.problems
+    assert (problem.line, problem.column) == (11, 29)
+    assert problem.source_line == text.split("\n")[10]
+    with pytest.raises(ConfigError, match=r"fig\.yaml:2:5: a ':' is not allowed here"):
+        load(written(tmp_path, f"a: 1{end}b: c: d{end}"))
 
 
 PIECES = [

@@ -72,6 +72,8 @@ def test_times_that_a_double_cannot_tell_apart_are_refused(tmp_path):
         "subtract a start from all"
     ]
     assert len(read(tmp_path, "time,y\n1,1\n1.0,2\n").times) == 2
+    (said,) = complaints(tmp_path, "time,y\n0,1\n1e-99999999999999999999,2\n")
+    assert said.startswith("data.csv:3: time: 1e-99999999999999999999 and 0 of line 2 are one number")
 
 
 def test_everything_wrong_with_the_rows_is_said_at_once(tmp_path):

@@ -12,6 +12,8 @@ from typer.testing import CliRunner
 
 from nlbench import config, systems
 from nlbench.cli.app import app
+from nlbench.config.assemble import MANDATORY
+from nlbench.config.document import value_of
 from nlbench.config.editor import json_schema
 from nlbench.config.schema import Experiment
 from nlbench.errors import ConfigError
@@ -89,10 +91,31 @@ def test_it_takes_all_experiments(validator):
     assert wrong == {}
 
 
-def test_digits_may_be_grouped(validator):
-    given = read(CONFIGS[-1]) | {"monte_carlo": {"runs": "20_000"}}
-    assert validator.is_valid(given)
-    assert not validator.is_valid(given | {"monte_carlo": {"runs": "many"}})
+@pytest.mark.parametrize("text", ["20_000", "2_0e3", "0x1_F", "0b1_0", "1_000.0"])
+def test_digits_may_be_grouped(validator, text):
+    given = read(CONFIGS[-1])
+    config.load(CONFIGS[-1], [f"monte_carlo.runs={text}"])
+    assert validator.is_valid(given | {"monte_carlo": {"runs": text}})
+    assert not validator.is_valid(given | {"monte_carlo": {"runs": f"{text} many"}})
+
+
+@pytest.mark.parametrize("text", ["1_000.5", "-1_0.5e-3", ".5_0"])
+def test_so_may_those_of_fractions(validator, text):
+    data = {"experiment": "small", "system": "oscillator", "filters": ["ekf"]}
+    config.from_dict(data | {"initial": {"mean": [value_of(text, "--set"), 0.0, 0.0]}})
+    assert validator.is_valid(data | {"initial": {"mean": [text, 0.0, 0.0]}})
+
+
+@pytest.mark.parametrize("key", sorted(set(Experiment.model_fields) - {"question"}))
+def test_both_take_no_value_for_what_may_be_left_out(validator, key):
+    data = {"experiment": "small", "system": "oscillator", "filters": ["ekf"], key: None}
+    if key in MANDATORY:
+        assert not validator.is_valid(data)
+        with pytest.raises(ConfigError):
+            config.from_dict(data)
+    else:
+        assert validator.is_valid(data)
+        config.from_dict(data)
 
 
 def wrongs():

@@ -12,6 +12,7 @@ from nlbench import figures
 from nlbench.errors import ConfigError
 from tests import synthetic_run
 
+UNDRAWABLE = "$\\foo$"  # to a typesetter of formulas
 SVG = "{http://www.w3.org/2000/svg}"
 PER_COORDINATE = ("rms", "rms_clipped", "mean_error", "variance", "third_moment")
 COORDINATES = {"position": "ft", "altitude_rate": "ft/s"}
@@ -135,6 +136,21 @@ def test_any_label_can_be_drawn(tmp_path):
         if path.suffix == ".svg":
             words = ET.fromstring(path.read_bytes()).find(f"{SVG}desc").text
             assert all(label in words for label in labels)
+
+
+@pytest.mark.parametrize("coordinate", ["x", "time"])
+@pytest.mark.parametrize(
+    "kind", ["rms", "mean_error", "variance", "third_moment", "density", "response", "nees"]
+)
+def test_any_unit_can_be_drawn(tmp_path, kind, coordinate):
+    units = {"x": ""}
+    tables = {
+        "runs": synthetic_run.kept(synthetic_run.FACTORS, units, 200),
+        "responses": synthetic_run.responses(synthetic_run.FACTORS, units, (0,)),
+        "consistency": synthetic_run.consistency(synthetic_run.FACTORS, 200),
+    }
+    run = synthetic_run.results(tmp_path, coordinates=units | {coordinate: UNDRAWABLE}, tables=tables)
+    assert figures.draw(run, [kind])
 
 
 def test_a_filter_without_a_usable_number_does_not_hide_the_others(tmp_path):

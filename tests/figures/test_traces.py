@@ -53,6 +53,12 @@ def test_every_traced_run_has_a_figure_in_the_order_of_the_file(tmp_path):
     assert [path.name for path in drawn] == ["trace-5.svg", "trace-5.png", "trace-0.svg", "trace-0.png"]
 
 
+def test_the_unit_of_time_can_be_any(tmp_path):
+    units = {**COORDINATES, "time": "$\\foo$"}
+    run = synthetic_run.results(tmp_path, coordinates=units, tables={"traces": table()})
+    assert figures.draw(run, ["trace"])
+
+
 def test_runs_that_are_no_longer_traced_lose_their_figures(tmp_path):
     figures.draw(results(tmp_path, table()))
     figures.draw(results(tmp_path, table(runs=(5,))))

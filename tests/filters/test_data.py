@@ -126,6 +126,8 @@ def test_measurements_may_be_named():
     assert {"angle_innovation", "rate_innovation"} <= set(columns)
     with pytest.raises(ConfigError, match="expected 2 different names, got angle"):
         nb.filter_data(f, TIMES, Y, measurements=["angle"])
+    with pytest.raises(ConfigError, match="expected 1 different names, got a, a"):
+        nb.filter_data(nb.filters.build("kalman", walk()), [0], [1.0], measurements=["a", "a"])
 
 
 def test_what_is_no_fair_sample_of_nis_is_marked():

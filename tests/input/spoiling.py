@@ -14,6 +14,16 @@ SCALARS = (
 ).split(" ") + [
     "9" * 400,
     "9" * 5000,
+    "0x" + "f" * 300,
+    "0x" + "f" * 4000,
+    "1_000.5",
+    "1e200",
+    "-1e200",
+    "1e-320",
+    "!!seq {a: 1}",
+    "!!map [a, b]",
+    "!!str [a]",
+    "!!float x",
     "x" * 3000,
     "[" * 300,
     "{a: " * 200,
@@ -24,17 +34,58 @@ SCALARS = (
     "a: b: c",
 ]
 CHARACTERS = " \t\n\r:-?[]{},&*!|>'\"%@`#~\\0a\x00\x07\x1b\x85\u2028\ufeff\ud7ff\U0001f600"
+NUMBERS = (
+    "1e200",
+    "-1e200",
+    "1e-200",
+    "1e-320",
+    ".inf",
+    "-.inf",
+    "9" * 400,
+    "0x" + "f" * 4000,
+    "1e30",
+    "1" + 30 * "0",
+)
+LINE_ENDS = ("\r", "\r\n", "\x85", "\u2028", "\u2029")
+TAGS = ("!!seq", "!!map", "!!str", "!!int", "!!float", "!!null", "!!set", "!!omap", "!evil", "!")
+NUMBER = re.compile(r"(?<![\w.-])[-+]?\.?\d[\w.+-]*")
+VALUE = re.compile(r"(?<=[:\-,] )\S|(?<=[\[{])\S")
+KEY = re.compile(r"[\w-]+:(?=\s)")
 TOKEN = re.compile(r"[^\s,:\[\]{}]+")
+LINE = re.compile(r"\n")
 WORD = re.compile(r"[A-Za-z_][\w-]*")
 
 
 def token(chance: random.Random, text: str) -> str:
     """Another value in the place of some word or number."""
-    places = list(TOKEN.finditer(text))
+    return _at_some(TOKEN, chance, text, lambda found: chance.choice(SCALARS))
+
+
+def number(chance: random.Random, text: str) -> str:
+    """In the place of a number one that is next to nothing, next to infinite or of hundreds of digits."""
+    return _at_some(NUMBER, chance, text, lambda found: chance.choice(NUMBERS))
+
+
+def tag(chance: random.Random, text: str) -> str:
+    """A tag in front of a key or a value, mostly of another kind."""
+    return _at_some(chance.choice([KEY, VALUE]), chance, text, lambda found: f"{chance.choice(TAGS)} {found}")
+
+
+def line_ends(chance: random.Random, text: str) -> str:
+    """Lines that end in another way: all of them, or one."""
+    end = chance.choice(LINE_ENDS)
+    return (
+        text.replace("\n", end) if chance.random() < 0.5 else _at_some(LINE, chance, text, lambda found: end)
+    )
+
+
+def _at_some(what: re.Pattern[str], chance: random.Random, text: str, instead: Callable[[str], str]) -> str:
+    """One of the places that match with something instead; the text as it is where none does."""
+    places = list(what.finditer(text))
     if not places:
         return text
     place = chance.choice(places)
-    return text[: place.start()] + chance.choice(SCALARS) + text[place.end() :]
+    return text[: place.start()] + instead(place[0]) + text[place.end() :]
 
 
 def misspelt(chance: random.Random, text: str) -> str:
@@ -83,6 +134,9 @@ TEXTS: tuple[Callable[[random.Random, str], str], ...] = (
     token,
     token,
     token,
+    number,
+    tag,
+    line_ends,
     misspelt,
     lines,
     character,

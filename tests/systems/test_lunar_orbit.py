@@ -33,6 +33,15 @@ def run(tmp_path, **changes):
     return nb.run(experiment(**{**stated, **changes}), tmp_path)
 
 
+@pytest.mark.parametrize(
+    "bad",
+    [{"length_unit": 1e200}, {"length_unit": 1e-200}, {"time_unit": 1e200}, {"measurement_variance": np.inf}],
+)
+def test_parameters_out_of_range_are_refused(bad):
+    with pytest.raises(ConfigError, match=next(iter(bad))):
+        nb.systems.build("lunar-orbit", **bad)
+
+
 def test_published_values_are_the_defaults():
     system = build()
     np.testing.assert_array_equal(system.initial.mean, [R0, 0, 0, V0])
