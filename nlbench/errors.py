@@ -26,8 +26,8 @@ class Problem(NamedTuple):
     def __str__(self) -> str:
         place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
         path = "" if self.line is None and self.file.endswith(f" {self.path}") else self.path
-        said = _shortened(": ".join(part for part in (path, self.message) if part))
-        head = printable(": ".join(part for part in (place, said) if part))
+        said = _shortened(printable(": ".join(part for part in (path, self.message) if part)))
+        head = ": ".join(part for part in (printable(place), said) if part)
         if not self.source_line or self.column is None:
             return head
         return f"{head}\n{_pointed(self.source_line, self.column)}"

@@ -30,6 +30,7 @@ def test_a_message_repeats_no_value_of_thousands_of_characters():
     assert said.startswith("a.yaml:3:5: claims.0.less: no filter is labelled '999")
     assert said.endswith("', here")
     assert len(said) < 1000
+    assert len(str(Problem("\u2028" * 800, "a", "a.yaml"))) < 1000  # each is shown as six characters
 
 
 def test_a_message_cannot_command_the_terminal():
