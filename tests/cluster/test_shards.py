@@ -15,7 +15,7 @@ from nlbench.engine.planning import space
 from nlbench.engine.shards import merge, run_shard
 from nlbench.errors import ConfigError, DamagedResults, EnvironmentFault, Interrupted, LockedError
 from nlbench.results.folder import RunFolder
-from tests.example import spoiled, written
+from tests.example import written
 from tests.small_runs import experiment, table_bytes
 
 RUNS = 3010  # 47 blocks and 2 runs; 2,048 are kept
@@ -117,7 +117,7 @@ def test_a_shard_of_another_schema_is_refused(copied, tmp_path):
 
 def test_a_shard_keeps_to_the_budget_and_to_what_is_free(tmp_path, monkeypatch):
     monkeypatch.setattr(space.atomic, "free_disk", lambda folder: 1000)
-    file = written(tmp_path, spoiled("experiment: culver/hermite-01", "experiment: shard"))
+    file = written(tmp_path, small().resolved_yaml())  # compiled by the tests above
     words = ["run", str(file), "--shard", "1/3", "--out", str(tmp_path / "out")]
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 5
