@@ -47,10 +47,9 @@ class Guard:
 
     def __init__(self, budget: float, show: Progress | None):
         self._budget, self._show = budget, show
-        self._begun: int | None = None  # runs done before
-        self._first: tuple[float, int] | None = (
-            None  # when the first results of this call came, and the runs done then
-        )
+        # Runs done before; when the first results of this call came, and the runs done then.
+        self._begun: int | None = None
+        self._first: tuple[float, int] | None = None
         self._decided = False
 
     def __call__(self, done: int, total: int) -> None:

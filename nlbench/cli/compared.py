@@ -61,11 +61,8 @@ def verdict(found: Compared, two_sided: bool) -> str:
         counts = ", ".join(f"{count} {word}" for word, count in failing.items())
         return f"{counts} of {len(found.table)} comparisons (margin {margin})"
     if found.identical:
-        return (
-            f"equal: all {len(found.table)} comparisons, to the last bit"
-            if len(found.table)
-            else "equal: the same run"
-        )
+        count = len(found.table)
+        return f"equal: all {count} comparisons, to the last bit" if count else "equal: the same run"
     if (found.table["verdict"] == "=").all():
         return f"equal: all {len(found.table)} comparisons, but for rounding"
     other = found.table["verdict"].value_counts()

@@ -52,7 +52,7 @@ def perf(
     from nlbench.perf.kernel import identity
 
     path = baseline or DEFAULT
-    if budget and not record and not path.exists():
+    if budget and baseline is None and not record and not path.exists():
         raise NothingCompared(f"{path}: no baseline to compare with; make one with --record")
     before = None if record or (baseline is None and not path.exists()) else read(path, identity())
     from nlbench import runtime

@@ -42,7 +42,7 @@ log = logging.getLogger("nlbench")
 def checked(address: str) -> int:
     """How many local processes `address` asks for, 0 for a scheduler. Raises `ConfigError` where that cannot be."""
     local = re.fullmatch(r"local:([1-9][0-9]{0,2})", address)
-    if not local and not re.fullmatch(r"(tcp|tls)://\S+:[0-9]+", address):
+    if not local and not re.fullmatch(r"(tcp|tls|ucx|wss?)://\S+:[0-9]+", address):
         raise ConfigError(
             f"--dask: got '{address}'; expected the address of a scheduler, tcp://HOST:PORT, or local:N for N processes"
         )

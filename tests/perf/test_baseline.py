@@ -83,6 +83,7 @@ def test_what_is_no_baseline_is_refused(tmp_path, text):
     ("arguments", "message"),
     [
         (["--baseline", "none.json"], "none.json: cannot read the baseline: no such file or directory"),
+        (["--baseline", "none.json", "--budget", "9%"], "none.json: cannot read the baseline: no such file"),
         (["--budget", "x"], "--budget: expected a percentage"),
         (["--budget", "0%"], "--budget: expected a percentage"),
         (["none.yaml"], "none.yaml: cannot read the experiment"),
