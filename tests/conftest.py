@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import tempfile
 
 from jaxtyping import install_import_hook
@@ -10,6 +11,9 @@ from jaxtyping import install_import_hook
 # Two workers compute beside each other, and XLA's threads of one would spin while those of the other work.
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("PJRT_NPROC", "1")
+
+# In the background job of a script SIGINT is ignored, which all that a test starts would inherit, and nlbench respect.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Before anything of nlbench is imported: the hook decorates every function of these packages; not of `algebra`,
 # which is called thousands of times for each program that is traced, so that tests took a fifth longer.
