@@ -73,6 +73,11 @@ def perf(
         estimates = gate.measured(timer.rounds, list(counts), gate.RECORDED_BAND if record else math.inf)
         if record:
             write(path, of(identity(), machine, estimates, chosen))
+            if disturbed := gate.disturbed(estimates):
+                output.complain(
+                    f"{path}: a baseline of a busy machine, bands of {', '.join(disturbed)} are wider than "
+                    f"{output.percent(gate.RECORDED_BAND)} %: record it again when nothing else runs here"
+                )
         findings = [gate.Finding(name, each, None, None, gate.NEW, {}) for name, each in estimates.items()]
         other: list[str] = []
     else:

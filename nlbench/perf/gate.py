@@ -36,6 +36,11 @@ def measured(rounds: Rounds, names: Sequence[str], wanted: float = math.inf) -> 
     return _batch(rounds, names, lambda _, now: now.band > wanted)
 
 
+def disturbed(recorded: Mapping[str, Estimate]) -> list[str]:
+    """Workloads whose bands stayed wider than a baseline's should be: what disturbed them may have moved them, too."""
+    return [name for name, each in recorded.items() if each.band > RECORDED_BAND]
+
+
 def compared(
     rounds: Rounds,
     counts: Mapping[str, dict[str, float]],

@@ -54,6 +54,12 @@ def test_noise_never_makes_a_regression_of_no_change(noise):
     assert "slower" not in {compared(seed, noise, 1.0).verdict for seed in range(100)}
 
 
+@pytest.mark.parametrize(("noise", "expected"), [(0.01, []), (0.2, ["a"])])
+def test_a_baseline_of_a_busy_machine_is_told_from_another(noise, expected):
+    recorded = gate.measured(Machine(3, noise), ["a"], gate.RECORDED_BAND)
+    assert gate.disturbed(recorded) == expected
+
+
 def test_says_undecided_where_the_noise_is_too_large_and_stops():
     found = compared(1, 0.5, 1.27)
     assert (found.verdict, found.now.rounds) == ("undecided", gate.MOST_ROUNDS)
