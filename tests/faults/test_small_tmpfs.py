@@ -1,4 +1,4 @@
-"""Claim: on a small disk that is full a run ends with 5 and no partial file, and goes on when there is room."""
+"""Claim: on a small disk that fills up a run ends with 5 and without a partial file, and goes on when there is room."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 SCRIPT = """
 cd {folder}
 mount -t tmpfs -o size={size} tmpfs disk || exit 99
-run() {{ {python} -m nlbench run {config} --runs 3000 --out disk/results; }}
+run() {{ {python} -m nlbench run {config} --runs 3000 --out disk/results --yes; }}
 run > said 2>&1; echo $? > code
 find disk -type f > left; cp -r disk/results before
 mount -o remount,size=64m disk
