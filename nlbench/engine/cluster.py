@@ -85,7 +85,7 @@ def dask_workers(address: str, task: remote.Task) -> Iterator[Dask]:
         yield workers
     finally:
         workers.close()
-        for each in (client, cluster):
+        for each in filter(None, (client, cluster)):
             with suppress(Exception):  # what is gone cannot be closed
                 each.close()
 

@@ -35,7 +35,7 @@ SHARDS = "shards"
 
 
 class Done(NamedTuple):
-    """What a shard has: its folder, and how many runs of how many that the experiment asks for in all."""
+    """Which share a shard is, its folder, and how many runs it has of how many that the experiment asks for in all."""
 
     share: Share
     folder: Path
