@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from nlbench.errors import ConfigError
+from nlbench.errors import ConfigError, Problem
 from nlbench.suggestions import suggestion
 
 if TYPE_CHECKING:
@@ -35,4 +35,4 @@ def checked(model: type[Model], values: Mapping[str, Any], where: str) -> Model:
                 lines.append(f"{where}.{path}: unknown{suggestion(path, model.model_fields)}")
             else:
                 lines.append(f"{where}.{path}: {problem['msg']} (got {problem['input']!r})")
-        raise ConfigError("\n".join(lines)) from None
+        raise ConfigError([Problem(line) for line in lines]) from None

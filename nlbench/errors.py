@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import NamedTuple
 
 WIDTH = 76
@@ -76,6 +77,28 @@ class ConfigError(NlbenchError):
 
     def __reduce__(self) -> tuple[type[ConfigError], tuple[list[Problem]]]:
         return type(self), (self.problems,)
+
+
+class Problems:
+    """What is found while several things are made: `with problems.of(path): make()` for each, then `refuse()`."""
+
+    def __init__(self) -> None:
+        self.found: list[Problem] = []
+
+    @contextmanager
+    def of(self, path: str) -> Iterator[None]:
+        """Keep what is wrong within; what has no place of its own stands at this path of the experiment."""
+        try:
+            yield
+        except ConfigError as error:
+            self.found += [
+                each if each.path or each.file else each._replace(path=path) for each in error.problems
+            ]
+
+    def refuse(self) -> None:
+        """Raises `ConfigError` with everything found, each once."""
+        if self.found:
+            raise ConfigError(list(dict.fromkeys(self.found)))
 
 
 class GateError(NlbenchError):

@@ -24,7 +24,7 @@ def read(
     problems: list[Problem] = []
     experiment, found, discrete = None, None, False
     try:
-        experiment = options.experiment(config, None, seed, settings)
+        experiment = options.experiment(config, None, seed, settings, computes=False)
         discrete, continuous = systems.kind(experiment.system.name, experiment.system.parameters)
         if continuous:
             message = "the system is measured continuously, and recorded data at times"

@@ -38,7 +38,7 @@ def found(where: Path, settings: list[str] | None, out: Path) -> Path:
         raise ConfigError(f"{where}: no such folder of a run, and no such experiment file")
     if where.is_dir():
         return where
-    folder = options.experiment(where, None, None, settings).folder(out)
+    folder = options.experiment(where, None, None, settings, computes=False).folder(out)
     if not folder.is_dir():
         first = options.command("run", where, settings)
         raise ConfigError(f"{where}: no results in {folder}; make them with: {first}")

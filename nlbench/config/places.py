@@ -51,3 +51,8 @@ class Document:
 def dotted(path: Path) -> str:
     """A path as messages and `--set` write it: `filters.0.limiter`."""
     return ".".join(str(part) for part in path)
+
+
+def keys(path: str) -> Path:
+    """The path that `dotted` wrote; a key that holds a point is several."""
+    return tuple(int(part) if part.isdigit() else part for part in path.split("."))

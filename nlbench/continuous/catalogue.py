@@ -7,18 +7,17 @@ from typing import Literal
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from nlbench.row import Row, StrictOptions
+from nlbench.solvers import Solver, Tolerances
 
 
-class Integrator(StrictOptions):
+class Integrator(Tolerances):
     """How a step is made under a measurement held over it."""
 
-    solver: str = Field(
+    solver: Literal["euler", Solver] = Field(
         default="euler",
         description="euler, which converges to the filter in Ito's sense; rk4, or the name of a diffrax solver, "
         "converges to the Stratonovich reading of the same equations, which is another filter",
     )
-    rtol: PositiveFloat | None = Field(default=None, description="relative tolerance of an adaptive solver")
-    atol: PositiveFloat | None = Field(default=None, description="absolute tolerance of an adaptive solver")
 
 
 class Options(StrictOptions):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import jax.numpy as jnp
 
 from nlbench.discrete.correction import Gaussian, symmetric
-from nlbench.discrete.problem import observation, transition
+from nlbench.discrete.problem import observation, transition, variables
 from nlbench.discrete.time import Clock
 from nlbench.filters.filter import Filter
 from nlbench.moments import integrate as integration
@@ -26,17 +26,24 @@ def build(
     step: Callable,
     slope: Callable,
     update: Callable,
+    rule: Callable[[int], Any] | None = None,
 ) -> Filter:
     """The filter made of
 
     step: (transition, k, prior) -> the Gaussian after the transition, for a system in discrete time.
     slope: (system, t, prior) -> the Gaussian's time derivative, for a system in continuous time.
     update: (observation, t, prior, y) -> (posterior, UpdateInfo).
+    rule: (variables) -> the points of expectations, laid once here so that what cannot be laid is refused early.
     """
     seen = observation(system, options)
+    if rule is not None:
+        rule(system.states)
+        rule(variables(seen, system.states))
 
     if isinstance(system, DiscreteSystem):
         motion = transition(system)
+        if rule is not None:
+            rule(variables(motion, system.states))
         clock = Clock.of_steps(lambda state, k: symmetrised(step(motion, k, state)))
     else:
         integrator = integration.fixed_rk4()

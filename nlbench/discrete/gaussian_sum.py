@@ -25,6 +25,7 @@ from nlbench.discrete import linearised, second_order
 from nlbench.discrete.correction import Gaussian
 from nlbench.discrete.gaussian import components, gaussian, symmetrised
 from nlbench.discrete.mixture import Mixture, joined, laid_out, overall, renewed
+from nlbench.discrete.points import gauss_hermite
 from nlbench.discrete.problem import bends, observation, transition
 from nlbench.discrete.time import Clock
 from nlbench.errors import ConfigError
@@ -48,6 +49,8 @@ def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) ->
             for function in (second_order.step, second_order.slope, second_order.update)
         )
     seen = observation(system, options)
+    if count > 1:
+        gauss_hermite(system.states, count)  # refuses more than it can lay
 
     if isinstance(system, DiscreteSystem):
         motion = transition(system)

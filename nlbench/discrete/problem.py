@@ -66,6 +66,11 @@ def spectrum(system: System, t: Any, x: Any) -> Any:
     return jnp.zeros((n, n)) if system.diffusion is None else system.diffusion_spectrum(t, x)
 
 
+def variables(noise: Noisy | Observation, n: int) -> int:
+    """Over how many variables an expectation goes: the states, and the noise where it does not enter linearly."""
+    return n if noise.linear else n + len(noise.cov)
+
+
 def enters_linearly(function: Callable, n: int, s: int) -> bool:
     """Whether the second derivatives in w of function(t, x, w) are zero by structure, for x (n,) and w (s,)."""
     return not curvatures(lambda given, w: function(given[0], given[1:], w), 1 + n, s)

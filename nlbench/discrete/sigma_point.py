@@ -26,7 +26,7 @@ import jax.numpy as jnp
 from nlbench.discrete import gaussian
 from nlbench.discrete.correction import Gaussian, correct, predicted
 from nlbench.discrete.points import Points, cubature, gauss_hermite, square_root, unscented
-from nlbench.discrete.problem import Noisy, Observation, spectrum, stacked
+from nlbench.discrete.problem import Noisy, Observation, spectrum, stacked, variables
 
 if TYPE_CHECKING:
     from nlbench.filters.filter import Filter, UpdateInfo
@@ -45,7 +45,7 @@ def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) ->
     if name == "ghkf":
         rule = partial(gauss_hermite, count=options.points)
     return gaussian.build(
-        name, system, options, partial(_step, rule), partial(_slope, rule), partial(_update, rule)
+        name, system, options, partial(_step, rule), partial(_slope, rule), partial(_update, rule), rule
     )
 
 
@@ -60,7 +60,7 @@ class Laid(NamedTuple):
 def lay(rule: Rule, prior: Gaussian, noise: Noisy | Observation) -> Laid:
     """The points of x, with w = 0 where noise enters linearly; else those of (x, w)."""
     n, s = len(prior.mean), len(noise.cov)
-    points = rule(n if noise.linear else n + s)
+    points = rule(variables(noise, n))
     e = points.at[:, :n] @ square_root(prior.cov).T
     if noise.linear:
         return Laid(e, jnp.zeros((len(e), s)), points)

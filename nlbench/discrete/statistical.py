@@ -23,7 +23,7 @@ import jax.numpy as jnp
 from nlbench.discrete import gaussian
 from nlbench.discrete.correction import Gaussian, correct, predicted
 from nlbench.discrete.points import gauss_hermite, square_root
-from nlbench.discrete.problem import Noisy, Observation, stacked
+from nlbench.discrete.problem import Noisy, Observation, stacked, variables
 
 if TYPE_CHECKING:
     from nlbench.filters.filter import Filter, UpdateInfo
@@ -36,7 +36,13 @@ def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) ->
     """The filter with `options.points` nodes per dimension."""
     count = options.points
     return gaussian.build(
-        name, system, options, partial(_step, count), partial(_slope, count), partial(_update, count)
+        name,
+        system,
+        options,
+        partial(_step, count),
+        partial(_slope, count),
+        partial(_update, count),
+        partial(gauss_hermite, count=count),
     )
 
 
@@ -45,7 +51,7 @@ def _line(
 ) -> tuple[Any, Any, Any]:
     """E f, E[f xi'] and E[f omega'] of f = values(x, w), where `noise` says how w enters."""
     n, s = len(prior.mean), len(noise.cov)
-    rule = gauss_hermite(n if noise.linear else n + s, count)
+    rule = gauss_hermite(variables(noise, n), count)
     xi, omega = rule.at[:, :n], rule.at[:, n:]
     x = prior.mean + xi @ square_root(prior.cov).T
     B = square_root(noise.cov)

@@ -22,11 +22,14 @@ def check_claims(claims: Iterable[Claim], layout: Layout) -> None:
         for component in layout.components(order)
     ]
     problems = [
-        Problem(f"claims.{claim.id}: the system has no {what} '{name}'{suggestion(name, names)}")
-        for claim in claims
-        for what, names, given in (
-            ("coordinate", coordinates, [claim.coordinate] if claim.coordinate else []),
-            ("moment", moments, claim.printed or []),
+        Problem(
+            f"'{claim.id}' is about the {what} '{name}', which the system does not have{suggestion(name, names)}",
+            f"claims.{number}.{key}",
+        )
+        for number, claim in enumerate(claims)
+        for what, key, names, given in (
+            ("coordinate", "coordinate", coordinates, [claim.coordinate] if claim.coordinate else []),
+            ("moment", "printed", moments, claim.printed or []),
         )
         for name in given
         if name not in names

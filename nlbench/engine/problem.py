@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,7 +13,8 @@ from nlbench import filters, plugins, schedule, systems
 from nlbench.config.schema import PARTICLES
 from nlbench.engine import single_precision
 from nlbench.engine.claims import check_claims
-from nlbench.errors import ConfigError
+from nlbench.errors import ConfigError, Problems
+from nlbench.errors import Problem as Wrong
 from nlbench.moments.moments import Moments
 from nlbench.simulate import path
 from nlbench.statistics.layout import Layout
@@ -63,48 +63,42 @@ class Problem(NamedTuple):
 def make(experiment: Experiment, own: System | DiscreteSystem | None = None) -> Problem:
     """The problem that an experiment states, about the user's own system if one is given.
 
-    Raises `ConfigError`, with all that was found, where a filter does not apply, where model and data do not fit, and
-    where derivatives do not survive float32.
+    Raises `ConfigError`, with all that was found, where a filter does not apply, where model and data do not fit, where
+    a claim is about what is not there, and where derivatives do not survive float32.
     """
     plugins.restore(experiment.plugins)
-    stated = own or systems.build(
-        experiment.system.name, **{**experiment.system.parameters, **experiment.truth}
-    )
-    truth = stated.truth or stated
-    for each in (truth,) if stated is truth else (truth, stated):
-        filters.check(each)
-    times = _schedule(experiment, truth)
+    problems = Problems()
+    with problems.of("system"):
+        stated = own or systems.build(
+            experiment.system.name, **{**experiment.system.parameters, **experiment.truth}
+        )
+        truth = stated.truth or stated
+        for each in (truth,) if stated is truth else (truth, stated):
+            filters.check(each)
+        times = _schedule(experiment, truth)
+    problems.refuse()
     models = _models(experiment, own)
-    makers: list[Callable[[], Runner]] = [
-        partial(_fitting, experiment, spec, models, truth, times) for spec in experiment.filters
-    ]
+    runners = []
+    for number, spec in enumerate(experiment.filters):
+        with problems.of(f"filters.{number}"):
+            runners.append(_fitting(experiment, spec, models, truth, times, f"filters.{number}"))
     if experiment.reference is not None:
-        makers.append(partial(_reference, experiment.reference, experiment.labels[-1], truth, times))
-    runners = _all(makers)
+        with problems.of("reference"):
+            runners.append(_reference(experiment.reference, experiment.labels[-1], truth, times))
+    layout = _layout(experiment, stated)
+    with problems.of("claims"):
+        check_claims(experiment.claims, layout)
+    problems.refuse()
     if experiment.engine.precision == "float32":
-        single_precision.check(runners, times, () if own else _units(experiment.system.name))
-    layout, block = _layout(experiment, stated), experiment.engine.block
-    check_claims(experiment.claims, layout)
-    return Problem(truth, runners, times, layout, block, stated, _nominal_steps(truth, times))
+        single_precision.check(tuple(runners), times, () if own else _units(experiment.system.name))
+    steps = _nominal_steps(truth, times)
+    return Problem(truth, tuple(runners), times, layout, experiment.engine.block, stated, steps)
 
 
 def _units(system: str) -> tuple[str, ...]:
     """The parameters by which a system's units are chosen."""
     names = systems.parameters(system).model_fields
     return tuple(f"system.{name}" for name in names if name.endswith("_unit"))
-
-
-def _all(makers: list[Callable[[], Runner]]) -> tuple[Runner, ...]:
-    """What each of them makes. Raises `ConfigError` with every problem of theirs, each once."""
-    runners, problems = [], []
-    for make_one in makers:
-        try:
-            runners.append(make_one())
-        except ConfigError as error:
-            problems += error.problems
-    if problems:
-        raise ConfigError(list(dict.fromkeys(problems)))
-    return tuple(runners)
 
 
 def _schedule(experiment: Experiment, truth: System | DiscreteSystem) -> Schedule:
@@ -116,7 +110,9 @@ def _schedule(experiment: Experiment, truth: System | DiscreteSystem) -> Schedul
             end, step, output, truth.interval, sightings, continuous=truth.measurement == "continuous"
         )
     if truth.interval is not None and truth.interval != round(truth.interval):
-        raise ConfigError(f"interval: got {truth.interval:g}; where time is discrete it is a number of steps")
+        holder = "truth" if "interval" in experiment.truth else "system"
+        message = f"got {truth.interval:g}; where time is discrete it is a number of steps"
+        raise ConfigError([Wrong(message, f"{holder}.interval")])
     return schedule.make(round(end), 1, round(output), truth.interval)
 
 
@@ -181,13 +177,14 @@ def _fitting(
     models: Callable[[FilterSpec], System | DiscreteSystem],
     truth: System | DiscreteSystem,
     times: Schedule,
+    at: str,
 ) -> Runner:
-    """A filter whose model fits the data. Raises `ConfigError` for another."""
+    """A filter, the one at `at`, whose model fits the data. Raises `ConfigError` for another."""
     model = models(spec)
     expected, found = _described(truth), _described(model)
     if found != expected:
         raise ConfigError(f"{spec.label}: its model has {found}, the data {expected}")
-    initial = overridden(model.initial, {**experiment.initial, **spec.initial})
+    initial = overridden(model.initial, experiment.initial, spec.initial, at)
     options = {**spec.options, "missing": False}
     if kind(model).continuous:
         options["step"] = _only_step(spec, times)
@@ -226,18 +223,23 @@ def _bound(
     return Runner(label, bound, initial, span / steps, steps)
 
 
-def overridden(initial: Moments, given: dict[str, Any]) -> Moments:
-    """Initial moments with those given in their place."""
-    changed = Moments(
-        given.get("mean", initial.mean), given.get("cov", initial.cov), initial.third, initial.fourth
-    )
-    n = len(initial.mean)
-    if np.shape(changed.mean) != (n,) or np.shape(changed.cov) != (n, n):
-        raise ConfigError(
-            f"initial: mean and cov have shapes {np.shape(changed.mean)} and {np.shape(changed.cov)}, "
-            f"the system needs ({n},) and ({n}, {n})"
-        )
-    return changed
+def overridden(initial: Moments, common: dict[str, Any], own: dict[str, Any], at: str) -> Moments:
+    """Initial moments, with those in their place that the experiment gives to all filters, and to the one at `at`.
+
+    Raises `ConfigError` where they are not of the system's size.
+    """
+    n, problems = len(initial.mean), []
+    given = {key: (value, "initial") for key, value in common.items()}
+    given |= {key: (value, f"{at}.initial") for key, value in own.items()}
+    for key, shape in (("mean", (n,)), ("cov", (n, n))):
+        value, holder = given.get(key, (getattr(initial, key), "initial"))
+        if np.shape(value) != shape:
+            problems.append(
+                Wrong(f"got shape {np.shape(value)}, the system needs {shape}", f"{holder}.{key}")
+            )
+    if problems:
+        raise ConfigError(problems)
+    return initial._replace(**{key: value for key, (value, _) in given.items()})
 
 
 def _layout(experiment: Experiment, truth: System | DiscreteSystem) -> Layout:

@@ -15,7 +15,7 @@ from nlbench.config.consistency import MOST_STEPS
 from nlbench.config.schema import PARTICLES, FilterSpec
 from nlbench.engine.problem import overridden
 from nlbench.engine.program_cache import use_cache
-from nlbench.errors import ConfigError, Problem
+from nlbench.errors import ConfigError, Problem, Problems
 from nlbench.filters import data
 from nlbench.statistics.chi_square import quantile
 from nlbench.statistics.consistency import TAIL
@@ -74,15 +74,13 @@ def bound(experiment: Experiment, labels: Sequence[str]) -> list[Filter]:
     Raises `ConfigError` with every problem there is.
     """
     plugins.restore(experiment.plugins)
-    made, problems = [], []
-    for spec in _specs(experiment):
+    made, problems = [], Problems()
+    for number, spec in enumerate(_specs(experiment)):
+        at = f"filters.{number}" if number < len(experiment.filters) else "reference"
         if spec.label in labels:
-            try:
-                made.append(_bound(experiment, spec))
-            except ConfigError as error:
-                problems += error.problems
-    if problems:
-        raise ConfigError(list(dict.fromkeys(problems)))
+            with problems.of(at):
+                made.append(_bound(experiment, spec, at))
+    problems.refuse()
     return made
 
 
@@ -139,13 +137,13 @@ def _specs(experiment: Experiment) -> list[FilterSpec]:
     return [*experiment.filters, FilterSpec(name=name, label=label, options=options, model=experiment.truth)]
 
 
-def _bound(experiment: Experiment, spec: FilterSpec) -> Filter:
+def _bound(experiment: Experiment, spec: FilterSpec, at: str) -> Filter:
     system = systems.build(experiment.system.name, **{**experiment.system.parameters, **spec.model})
     if getattr(system, "sightings", None):
         raise ConfigError(
             f"{spec.label}: the system is measured at angles, and recorded data have times only"
         )
-    initial = overridden(system.initial, {**experiment.initial, **spec.initial})
+    initial = overridden(system.initial, experiment.initial, spec.initial, at)
     options: dict[str, Any] = dict(spec.options)
     if "missing" in options:
         options["missing"] = True

@@ -12,14 +12,13 @@ from nlbench.continuous.catalogue import SHARED as ALSO_CONTINUOUS
 from nlbench.discrete.catalogue import ROWS as DISCRETE
 from nlbench.discrete.catalogue import Options as SampledOptions
 from nlbench.row import Row, StrictOptions
+from nlbench.solvers import Solver, Tolerances
 
 
-class Integrator(StrictOptions):
+class Integrator(Tolerances):
     """An integrator of the moment equations: a solver of diffrax by name, with tolerances (None: fixed steps)."""
 
-    solver: str = Field(default="rk4", description="rk4, or the name of a diffrax solver such as Tsit5")
-    rtol: PositiveFloat | None = Field(default=None, description="relative tolerance of an adaptive solver")
-    atol: PositiveFloat | None = Field(default=None, description="absolute tolerance of an adaptive solver")
+    solver: Solver = Field(default="rk4", description="rk4, or the name of a diffrax solver such as Tsit5")
 
 
 class Options(StrictOptions):

@@ -16,6 +16,7 @@ import jax
 import jax.numpy as jnp
 
 from nlbench.algebra import Tensor, shared, zeros
+from nlbench.errors import ConfigError
 from nlbench.filters.filter import Filter, UpdateInfo, central_angle
 from nlbench.moments import integrate as integration
 from nlbench.moments.equations import fourth_moment_rate, rates
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from nlbench.row import Row
     from nlbench.systems.system import System
 
+MOST_NODES = 1_000_000  # of a product rule
 UPDATES: dict[str, Callable] = {
     "kalman": kalman,
     "hermite3": hermite3,
@@ -63,7 +65,15 @@ CURVED: dict[str, Callable[[Any], Callable[[Components, Seen], Outcome]]] = {
 
 
 def build(name: str, row: Row, system: System, options: Options) -> Filter:
-    """The filter of a catalogue row, bound to a system measured at discrete times."""
+    """The filter of a catalogue row, bound to a system measured at discrete times.
+
+    Raises `ConfigError` where an update would integrate over too many nodes.
+    """
+    points = getattr(options, "points", 1)
+    if points**system.states > MOST_NODES:
+        raise ConfigError(
+            f"{name}.points: {points} along each of {system.states} states are more than {MOST_NODES:,} nodes"
+        )
     integrator = integration.build(**options.integrator.model_dump())
     updated = _curved_update if row.update in CURVED else _linear_update
 

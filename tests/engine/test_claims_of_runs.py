@@ -67,6 +67,10 @@ def test_a_claim_about_a_coordinate_or_a_moment_that_there_is_not_is_refused_bef
     ]
     with pytest.raises(ConfigError) as told:
         nb.run(experiment(claims=wrong), tmp_path)
-    assert "claims.C1: the system has no coordinate 'y'" in str(told.value)
-    assert "claims.C3: the system has no moment '1,2'" in str(told.value)
+    assert "claims.0.coordinate: 'C1' is about the coordinate 'y', which the system does not have" in str(
+        told.value
+    )
+    assert "claims.1.printed: 'C3' is about the moment '1,2', which the system does not have" in str(
+        told.value
+    )
     assert not list(tmp_path.iterdir())

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+from typing import get_args
+
+import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +14,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import nlbench as nb
+from nlbench import solvers
+from nlbench.moments import integrate
 from tests.oracle import fourth_moment, random_cov, rng, symmetrise
 
 F = np.array([[-0.3, 1.0], [-1.2, -0.2]])
@@ -107,3 +113,31 @@ def test_an_interval_is_covered_in_steps_of_the_option():
     system = linear_system(start())
     coarse, fine = (np.asarray(predicted("second-order", system, 0.8, step=s).cov) for s in (0.8, 0.08))
     assert np.abs(coarse - fine).max() > 1e-4
+
+
+NAMED = [*get_args(solvers.Adaptive), *get_args(solvers.Fixed), *get_args(solvers.Implicit)]
+OTHERS = sorted(
+    name
+    for name, each in vars(diffrax).items()
+    if isinstance(each, type) and issubclass(each, diffrax.AbstractSolver) and name not in NAMED
+)
+
+
+def integrates(name, rtol=None):
+    integrator = integrate.by_name(name, rtol)
+    jax.eval_shape(lambda y: integrator.integrate(lambda t, y: -y, 0.0, 0.1, 2, y), np.ones(2))
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_a_solver_that_options_name_integrates_as_they_say(name):
+    fixed, adaptive = name not in get_args(solvers.Implicit), name not in get_args(solvers.Fixed)
+    for rtol, works in ((None, fixed), (1e-6, adaptive)):
+        with contextlib.nullcontext() if works else pytest.raises(Exception, match="solver"):
+            integrates(name, rtol)
+
+
+def test_no_solver_of_diffrax_that_integrates_is_missing():
+    for name in OTHERS:
+        for rtol in (None, 1e-6):
+            with pytest.raises((TypeError, ValueError, RuntimeError)):
+                integrates(name, rtol)
