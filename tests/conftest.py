@@ -22,10 +22,28 @@ install_import_hook([f"nlbench.{package}" for package in NUMERICAL.split()], "be
 
 import jax  # noqa: E402 - the hook comes first
 
+from nlbench import runtime  # noqa: E402
+
 jax.config.update("jax_enable_x64", True)
 
 
 def pytest_configure(config):
+    _compile_quickly(config)
+    _share_a_cache(config)
+
+
+def _compile_quickly(config):
+    """Compilation is most of what tests do, and LLVM's optimisation nearly half of that.
+
+    Long tests, which measure, and programs that `small_runs.python` starts are compiled as users have them, and so is
+    everything where XLA_FLAGS says so. A test in `tests/runtime` shows that numbers are the same, to rounding.
+    """
+    if config.option.markexpr == "not long":
+        os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=0")
+    runtime.prepare()
+
+
+def _share_a_cache(config):
     """One cache of compiled programs for all workers and every process that a test starts, empty at the beginning.
 
     jax decides at its first compilation whether it has a cache, so it is named before. A caller's own is used and kept.

@@ -53,6 +53,7 @@ def as_json(value: Any, *faults: NlbenchError) -> None:
     for each in faults:
         each.told = True
     print(json.dumps(_finite(value), indent=2, ensure_ascii=False))
+    flush()
 
 
 def _finite(value: Any) -> Any:

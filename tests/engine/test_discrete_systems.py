@@ -308,7 +308,7 @@ def test_everything_that_does_not_fit_is_said_at_once(tmp_path):
             reference="exact",
         )
     text = str(caught.value)
-    for part in ("kalman: transition is not linear", "initial: mean", "exact: "):
+    for part in ("kalman: transition is not linear", "filters.1.initial.mean: got", "exact: "):
         assert part in text
     assert len(caught.value.problems) == 3
 
