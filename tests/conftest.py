@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import tempfile
@@ -30,6 +31,7 @@ jax.config.update("jax_enable_x64", True)
 def pytest_configure(config):
     _compile_quickly(config)
     _share_a_cache(config)
+    _collect_rarely()
 
 
 def _compile_quickly(config):
@@ -41,6 +43,11 @@ def _compile_quickly(config):
     if config.option.markexpr == "not long":
         os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=0")
     runtime.prepare()
+
+
+def _collect_rarely():
+    """Traced programs are many objects that stay."""
+    gc.set_threshold(200_000, 20, 100)
 
 
 def _share_a_cache(config):

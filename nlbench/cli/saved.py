@@ -61,7 +61,7 @@ def replay(
     json: options.Json = False,
 ) -> None:
     """Show one run of one filter, step by step."""
-    experiment = options.experiment(config, runs, seed, settings)
+    experiment = options.experiment(config, runs, seed, settings, computes=False)
     if label not in experiment.labels:
         from nlbench.suggestions import suggestion
 

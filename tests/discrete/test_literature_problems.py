@@ -144,6 +144,7 @@ def exact_means(y):
     return np.array(found)
 
 
+@pytest.mark.long
 def test_the_bootstrap_filter_approaches_the_exact_posterior_as_particles_grow():
     """Distance of its means from the exact ones over 150 steps, of 16 filters on the same data: it falls as the root of
     their number, by 4 for 16 times as many, within a factor of 2; it is small against the exact filter's error of 3."""

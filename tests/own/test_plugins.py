@@ -264,7 +264,8 @@ def test_a_plain_model_refuses_what_all_options_refuse(entry, message):
 
 def test_validate_says_what_shape_does_not_fit():
     Path("walk.py").write_text(BROKEN["drift"][0])
-    assert problems("validate", "own.yaml", "--plugin", "walk.py") == f"{BROKEN['drift'][1]}\n"
+    said = problems("validate", "own.yaml", "--plugin", "walk.py")
+    assert said.startswith(f"own.yaml:3:9: system: {BROKEN['drift'][1]}\n")
 
 
 UNFIT = {

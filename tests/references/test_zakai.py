@@ -247,7 +247,7 @@ def test_the_cubic_sensor_is_a_large_particle_filter_within_its_standard_errors(
         pytest.param("D1", "M11", 1.0, 10.0, marks=pytest.mark.long),
         pytest.param("D1", "M12", 1.0, 0.1, marks=pytest.mark.long),
         ("D1", "M11", 0.25, 10.0),
-        ("D2", "M21", 1.0, 0.1),
+        pytest.param("D2", "M21", 1.0, 0.1, marks=pytest.mark.long),
     ],
 )
 def test_the_grid_of_schwartz_is_fine_enough(dynamics, measurement, noise, psd):

@@ -35,7 +35,9 @@ SCALAR = {
 }
 
 
-@pytest.mark.parametrize("experiment", [SCALAR, ORBIT], ids=lambda each: each["experiment"])
+@pytest.mark.parametrize(
+    "experiment", [pytest.param(SCALAR, id="scalar"), pytest.param(ORBIT, id="orbit", marks=pytest.mark.long)]
+)
 def test_numbers_are_those_of_optimised_programs(tmp_path, experiment):
     experiment = {**experiment, "monte_carlo": {"runs": 100, "seed": 3}, "engine": {"cost": False}}
     program = "import sys, nlbench; nlbench.run(sys.argv[1], out=sys.argv[2])"
