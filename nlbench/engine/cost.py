@@ -67,15 +67,17 @@ def cost_table(problem: Problem, seed: int, threads: int) -> pd.DataFrame:
 def _compiled(problem: Problem, data: Simulated, runner: Runner) -> tuple[Any, float]:
     """The program of one filter, and how long it took to make."""
     begun = time.perf_counter()
-    program = jax.jit(partial(_alone, problem, runner)).lower(data, np.int32(1)).compile()
+    program = jax.jit(partial(alone, problem, runner)).lower(data, np.int32(1)).compile()
     return program, time.perf_counter() - begun
 
 
-def _alone(problem: Problem, runner: Runner, data: Simulated, count: Any) -> Any:
-    """One filter on the data of the first `count` blocks; a sum, so that nothing is left out."""
+def alone(problem: Problem, runner: Runner, data: Simulated, count: Any) -> Any:
+    """One filter on the data of `count` blocks, which come again when there are no more; a sum, so that nothing is left
+    out."""
+    blocks = len(jax.tree.leaves(data)[0])
 
     def add_block(number: Any, total: Any) -> Any:
-        block = jax.tree.map(lambda leaf: leaf[number], data)
+        block = jax.tree.map(lambda leaf: leaf[number % blocks], data)
         return total + jnp.sum(followed(problem, runner, block).components, axis=(0, 1))
 
     return jax.lax.fori_loop(0, count, add_block, jnp.zeros(problem.block))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from nlbench.perf.workloads import Workload
 
 DEFAULT = Path("perf-baseline.json")
-SCHEMA = 1
+SCHEMA = 2
 
 
 class Entry(NamedTuple):
@@ -91,7 +91,9 @@ def read(path: Path, kernel: str) -> Baseline:
         raise ConfigError(f"{path}: no baseline: not JSON") from error
     try:
         if plain["schema"] != SCHEMA:
-            raise ConfigError(f"{path}: schema {plain['schema']!r}; this version reads schema {SCHEMA}")
+            raise ConfigError(
+                f"{path}: schema {plain['schema']!r}; this version reads schema {SCHEMA}: record it again"
+            )
         found = Baseline(
             str(plain["kernel"]),
             {str(name): str(value) for name, value in plain["machine"].items()},

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-SAMPLE_SECONDS = 0.008  # a sample repeats its call until it takes about this long
-Call = Callable[[], object]
+SAMPLE_SECONDS = 0.008  # a sample repeats its work until it takes about this long
+Call = Callable[[int], object]  # (times): computes it so many times
 Clock = Callable[[], float]
 
 
@@ -30,11 +30,11 @@ def clock() -> Clock:
 class Timer:
     """Rounds of samples: for each workload kernel, workload, kernel, workload, so that what drifts cancels."""
 
-    def __init__(self, kernel: Call, calls: Mapping[str, Call], clock: Clock):
+    def __init__(self, kernel: Callable[[], object], calls: Mapping[str, Call], clock: Clock):
         self._clock = clock
-        self._kernel, self._calls = kernel, dict(calls)
+        self._kernel, self._calls = repeated(kernel), dict(calls)
         self._repeats = {name: self._needed(call) for name, call in self._calls.items()}
-        self._kernel_repeats = self._needed(kernel)
+        self._kernel_repeats = self._needed(self._kernel)
         self._order = np.random.default_rng(0)
 
     def rounds(self, names: Sequence[str], count: int) -> dict[str, np.ndarray]:
@@ -48,12 +48,24 @@ class Timer:
         return found
 
     def _needed(self, call: Call) -> int:
-        call()
-        return max(1, round(SAMPLE_SECONDS / max(self._seconds(call, 1), 1e-6)))
+        call(1)
+        times = 1
+        for _ in range(2):  # the first time is mostly that of calling where there is little to compute
+            times = max(1, round(SAMPLE_SECONDS / max(self._seconds(call, times), 1e-6)))
+        return times
 
-    def _seconds(self, call: Call, repeats: int) -> float:
-        call()  # what another program left in the caches is not this one's to pay
+    def _seconds(self, call: Call, times: int) -> float:
+        call(1)  # what another program left in the caches is not this one's to pay
         begun = self._clock()
-        for _ in range(repeats):
+        call(times)
+        return (self._clock() - begun) / times
+
+
+def repeated(call: Callable[[], object]) -> Call:
+    """Called as often as it is to be computed."""
+
+    def calls(times: int) -> None:
+        for _ in range(times):
             call()
-        return (self._clock() - begun) / repeats
+
+    return calls

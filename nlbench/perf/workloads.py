@@ -41,10 +41,14 @@ GROWTH: dict[str, Any] = {
 
 
 class Workload(NamedTuple):
-    """A compiled program with its data, its counts, and what identifies the experiment behind it, if there is one."""
+    """A compiled program with its data, its counts, and what identifies the experiment behind it, if there is one.
+
+    call: (times) computes all of it so many times. Filters do in one call of the program: of cheap ones a call takes
+    longer than what it computes, and that would hide how slow they are.
+    """
 
     name: str
-    call: Callable[[], object]
+    call: Callable[[int], object]
     counts: dict[str, float]
     experiment: str = ""
 
@@ -86,21 +90,19 @@ def _filters(experiment: Experiment) -> list[Workload]:
 
 def alone(name: str, problem: Problem, runner: Runner, data: Any) -> Workload:
     """One filter on the data of all blocks."""
-    import jax
-    import jax.numpy as jnp
+    import numpy as np
 
-    from nlbench.engine.block import followed
+    from nlbench.engine import cost
 
     traced, runner = _watched(runner)
-
-    def work(data: Any) -> Any:
-        return jax.lax.map(lambda block: jnp.sum(followed(problem, runner, block).components, (0, 1)), data)
-
-    return compiled(name, work, (data,), traced)
+    program, counts = compiled(partial(cost.alone, problem, runner), (data, np.int32(1)), traced)
+    return Workload(name, lambda times: _ended(program(data, np.int32(times * BLOCKS))), counts)
 
 
 def whole(experiment: Experiment) -> Workload:
     """All that a run computes: random numbers, truth, filters, statistics."""
+    import jax
+
     from nlbench.engine import block, problem
 
     stated = problem.make(experiment)
@@ -108,21 +110,33 @@ def whole(experiment: Experiment) -> Workload:
     stated = stated._replace(runners=tuple(runner for _, runner in watched))
     chunk = block.make_chunk(stated, 0, BLOCKS, BLOCKS, BLOCKS * stated.block)
     traced = lambda: sum(each() for each, _ in watched)  # noqa: E731
-    name = f"{experiment.experiment} whole run"
-    return compiled(name, partial(block.chunk_sums, stated), (block.words(SEED), chunk), traced)
+    arguments = _ended(jax.device_put((block.words(SEED), chunk)))
+    program, counts = compiled(partial(block.chunk_sums, stated), arguments, traced)
+
+    def call(times: int) -> None:
+        for _ in range(times):
+            _ended(program(*arguments))
+
+    return Workload(f"{experiment.experiment} whole run", call, counts)
 
 
-def compiled(name: str, work: Callable, arguments: tuple, traced: Callable[[], int] = lambda: 1) -> Workload:
-    """A workload of a function and its arguments; `traced` says how often its parts were traced."""
+def compiled(
+    work: Callable, arguments: tuple, traced: Callable[[], int] = lambda: 1
+) -> tuple[Callable, dict[str, float]]:
+    """The program of a function for such arguments, and its counts; `traced` says how often its parts were traced."""
     import jax
 
     _listen()
-    arguments = jax.block_until_ready(jax.device_put(arguments))
     before = len(_compilations)
     program = jax.jit(work).lower(*arguments).compile()
-    jax.block_until_ready(program(*arguments))
-    counts = counted(program, len(_compilations) - before, traced())
-    return Workload(name, lambda: jax.block_until_ready(program(*arguments)), counts)
+    _ended(program(*arguments))
+    return program, counted(program, len(_compilations) - before, traced())
+
+
+def _ended(result: Any) -> Any:
+    import jax
+
+    return jax.block_until_ready(result)
 
 
 def _watched(runner: Runner) -> tuple[Callable[[], int], Runner]:

@@ -15,7 +15,7 @@ from nlbench.perf.workloads import Workload
 from tests import small_runs
 
 GOOD = {
-    "schema": 1,
+    "schema": 2,
     "kernel": "k",
     "machine": {"jaxlib": "1"},
     "workloads": {"a": {"ratio": 2.0, "band": 0.01, "counts": {"flops": 3}, "experiment": "e"}},
@@ -36,7 +36,7 @@ def test_is_read_as_it_was_written(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"schema": 2}, "schema 2; this version reads schema 1"),
+        ({"schema": 1}, "schema 1; this version reads schema 2: record it again"),
         ({"kernel": "other"}, "measured with reference kernel other, this is k"),
         ({"workloads": []}, "no baseline of"),
         ({"workloads": {"a": {"ratio": -1, "band": 0, "counts": {}}}}, "no baseline of"),

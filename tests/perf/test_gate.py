@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlbench.perf import baseline, gate, verdict
+from nlbench.perf import baseline, gate, timing, verdict
 from nlbench.perf.counts import risen
 from nlbench.perf.workloads import Workload
 from tests.small_runs import python
@@ -117,3 +117,24 @@ def test_xla_gets_one_thread_whose_time_alone_is_counted():
     done = python(program)
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) < 1.2
+
+
+def test_what_a_call_takes_beside_its_work_does_not_hide_work():
+    """A call of 100 microseconds for work of 20 or 26; the kernel calls each time, as it always did."""
+    now = 0.0
+
+    def working(seconds):
+        def call(times):
+            nonlocal now
+            now += 100e-6 + seconds * times
+
+        return call
+
+    def kernel():
+        nonlocal now
+        now += 1e-3
+
+    calls = {"once": working(20e-6), "planted": working(26e-6)}
+    found = timing.Timer(kernel, calls, lambda: now).rounds(list(calls), 15)
+    once, planted = (verdict.estimate(found[name]).ratio for name in calls)
+    assert planted / once == pytest.approx(1.3, rel=0.01)
