@@ -81,7 +81,7 @@ def killed(folder: Path, config: Path, runs: int, kills: int, seed: int) -> Kill
         except subprocess.TimeoutExpired:
             number = drawn.choice(SIGNALS)
             process.send_signal(number)
-            if process.wait() in (130, -signal.SIGKILL):
+            if process.wait() in (130, -number):  # the latter as well where Python has only begun to start
                 signals.append((number.name, process.returncode))
                 continue
         ended(process)
