@@ -42,6 +42,7 @@ LONGEST = 4.0  # rT of one sum (3)
 NOTHING = 1e-17  # a share of the whole sum
 MOST_AT_ENDS = 1e-5  # in the outermost cells, so that less than some 1e-4 belongs beyond them
 MOST_ARTIFICIAL = 0.05
+MOST_POINTS = 100_000  # 51 MB of a block
 NODES, SHARES = np.polynomial.legendre.leggauss(3)
 
 
@@ -58,6 +59,10 @@ def build(system: System | DiscreteSystem, record: ZakaiGrid) -> Filter:
     """The posterior as a filter. Raises `ConfigError` where the method does not apply."""
     if not isinstance(system, System) or system.states != 1 or system.diffusion is None:
         raise ConfigError("exact: a Zakai grid is for continuous time and one state with process noise")
+    if record.points > MOST_POINTS:
+        raise ConfigError(
+            f"exact: a grid of {record.points:,} points would resolve this system's noise; at most {MOST_POINTS:,}"
+        )
     spacing = (record.upper - record.lower) / record.points
     centres = record.lower + spacing * (np.arange(record.points) + 0.5)
     with jax.ensure_compile_time_eval():

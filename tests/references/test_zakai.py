@@ -323,6 +323,7 @@ REFUSED = {
         (-5.0, 5.0, 100),
     ),
     "seems 372% larger than it is": (scalar(lambda t, x: 1 - x, lambda t, x: 0.02), (-5.0, 5.0, 100)),
+    "100,001 points would resolve": (LINEAR, (-5.0, 5.0, 100_001)),
     "measurements are continuous": (nb.systems.build("cubic-sensor"), (-10.0, 10.0, 100)),
 }
 
