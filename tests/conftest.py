@@ -35,7 +35,7 @@ def pytest_configure(config):
 
 
 def _compile_quickly(config):
-    """Compilation is most of what tests do, and LLVM's optimisation nearly half of that.
+    """Compilation is most of what tests of the engine do, and LLVM's optimisation nearly half of that.
 
     Long tests, which measure, and programs that `small_runs.python` starts are compiled as users have them, and so is
     everything where XLA_FLAGS says so. A test in `tests/runtime` shows that numbers are the same, to rounding.

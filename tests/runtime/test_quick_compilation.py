@@ -20,15 +20,7 @@ ORBIT = {
 SCALAR = {
     "experiment": "scalar",
     "system": "culver-scalar",
-    "filters": [
-        "second-order",
-        "third-order",
-        "fourth-order",
-        "series-3",
-        "quadrature-2",
-        "ukf",
-        "bootstrap",
-    ],
+    "filters": ["third-order-guarded", "quadrature-2", "bootstrap"],
     "reference": "exact",
     "time": {"end": 0.5, "step": 0.02, "output": 0.1},
     "report_times": [0.5],
