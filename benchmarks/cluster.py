@@ -36,7 +36,7 @@ def report(name: str, seconds: list[list[float]]) -> None:
 
 def calls(experiment: config.Experiment, runs: int, rounds: int) -> list[list[float]]:
     """Seconds of all blocks with one worker and with two, each round."""
-    from nlbench.engine.cluster import dask_workers
+    from nlbench.engine.cluster import Dask, opening
     from nlbench.engine.compiled import CAPACITY, compile_chunks
     from nlbench.engine.problem import make
     from nlbench.engine.remote import Task
@@ -48,7 +48,8 @@ def calls(experiment: config.Experiment, runs: int, rounds: int) -> list[list[fl
     blocks = runs // experiment.engine.block
     seconds = []
     with ExitStack() as stack:
-        arms = [stack.enter_context(dask_workers(f"local:{number}", task)) for number in (1, 2)]
+        opened = [stack.enter_context(opening(f"local:{number}")) for number in (1, 2)]
+        arms = [stack.enter_context(Dask(each.result().client, task)) for each in opened]
         for turn in range(rounds + 1):  # the first is for compiling
             seconds.append([])
             for workers in arms:

@@ -27,6 +27,8 @@ from nlbench import runtime  # noqa: E402
 
 jax.config.update("jax_enable_x64", True)
 
+QUICK = "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false"
+
 
 def pytest_configure(config):
     _compile_quickly(config)
@@ -35,13 +37,14 @@ def pytest_configure(config):
 
 
 def _compile_quickly(config):
-    """Compilation is most of what tests of the engine do, and LLVM's optimisation nearly half of that.
+    """Compilation is most of what tests of the engine do, and half of that are LLVM's optimisation and the newer of
+    XLA's two ways to write fused loops.
 
     Long tests, which measure, and programs that `small_runs.python` starts are compiled as users have them, and so is
     everything where XLA_FLAGS says so. A test in `tests/runtime` shows that numbers are the same, to rounding.
     """
     if config.option.markexpr == "not long":
-        os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=0")
+        os.environ.setdefault("XLA_FLAGS", QUICK)
     runtime.prepare()
 
 

@@ -12,10 +12,10 @@ import re
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nlbench.engine import remote
 from nlbench.engine.memory import ran_out
@@ -51,13 +51,33 @@ def checked(address: str) -> int:
     return int(local[1]) if local else 0
 
 
-@contextmanager
-def dask_workers(address: str, task: remote.Task) -> Iterator[Dask]:
-    """The workers at `address`, closed at the end if they were started here.
+class Opened(NamedTuple):
+    """A client, and the cluster of processes that was started for it, if one was."""
 
-    Raises `ConfigError` for an address that is none, `EnvironmentFault` where no scheduler answers.
+    client: Any
+    cluster: Any
+
+
+@contextmanager
+def opening(address: str) -> Iterator[Future[Opened]]:
+    """The workers at `address`, which are connected to, or started, while the caller does something else; closed at the
+    end if they were started here.
+
+    The future raises `EnvironmentFault` where no scheduler answers. Raises `ConfigError` for an address that is none.
     """
     processes = checked(address)
+    with ThreadPoolExecutor(1, "nlbench-opening") as pool:
+        opened = pool.submit(_open, address, processes)
+        try:
+            yield opened
+        finally:
+            with suppress(Exception):  # where it failed there is nothing to close
+                for each in filter(None, opened.result()):
+                    with suppress(Exception):  # what is gone cannot be closed
+                        each.close()
+
+
+def _open(address: str, processes: int) -> Opened:
     import dask
     from distributed import Client, LocalCluster
 
@@ -75,19 +95,11 @@ def dask_workers(address: str, task: remote.Task) -> Iterator[Dask]:
                     preload=[remote.__name__],
                     silence_logs=logging.CRITICAL,
                 )
-        client = Client(cluster or address, timeout=SECONDS_TO_CONNECT, set_as_default=False)
+        return Opened(Client(cluster or address, timeout=SECONDS_TO_CONNECT, set_as_default=False), cluster)
     except Exception as error:  # no answer, other versions, no certificates: each has an error of its own
         if cluster is not None:
             cluster.close()
         raise EnvironmentFault(f"no dask scheduler answers at {address}: {_said(error)}") from error
-    workers = Dask(client, task)
-    try:
-        yield workers
-    finally:
-        workers.close()
-        for each in filter(None, (client, cluster)):
-            with suppress(Exception):  # what is gone cannot be closed
-                each.close()
 
 
 def _said(error: Exception) -> str:
@@ -123,6 +135,12 @@ class Dask:
         promised.set_running_or_notify_cancel()
         self._send(promised, first, count, 0)
         return promised
+
+    def __enter__(self) -> Dask:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def close(self) -> None:
         """Want nothing any more."""

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager, closing
+from concurrent.futures import Future
+from contextlib import AbstractContextManager, closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nlbench import runtime
 from nlbench.config.schema import SystemSpec
 from nlbench.engine.bounds import bounds_table
-from nlbench.engine.cluster import dask_workers
+from nlbench.engine.cluster import Dask, Opened, opening
 from nlbench.engine.compiled import CAPACITY, Compiled, compile_chunks
 from nlbench.engine.finish import complete, read_anew, write
 from nlbench.engine.interruption import stop_requests
@@ -81,31 +82,33 @@ def _run(
             return Results(folder.path)
         begun = time.perf_counter()
         bounds = bounds_table(problem, experiment.monte_carlo.seed) if experiment.bounds else None
-        compiled = compiled or compile_chunks(problem, experiment.monte_carlo.seed)
-        totals = resumed(folder, compiled)
-        runs = max(runs, totals.runs)
-        experiment = experiment.of_runs(runs)
-        threads = experiment.engine.threads or runtime.threads()
-        if check is not None:
-            check(compiled, totals, runs, threads, folder.path)
-        folder.reopen()
-        folder.write_experiment(experiment.resolved_yaml())
-        chunk = experiment.engine.chunk or CAPACITY
-        with _workers(experiment, compiled, runs, threads, dask) as workers:
-            totals = compute(compiled, folder, totals, runs, workers, chunk, progress, stopped)
+        with opening(dask) if dask else nullcontext() as opened:  # while this process compiles
+            compiled = compiled or compile_chunks(problem, experiment.monte_carlo.seed)
+            totals = resumed(folder, compiled)
+            runs = max(runs, totals.runs)
+            experiment = experiment.of_runs(runs)
+            threads = experiment.engine.threads or runtime.threads()
+            if check is not None:
+                check(compiled, totals, runs, threads, folder.path)
+            folder.reopen()
+            folder.write_experiment(experiment.resolved_yaml())
+            chunk = experiment.engine.chunk or CAPACITY
+            with _workers(experiment, compiled, runs, threads, opened) as workers:
+                totals = compute(compiled, folder, totals, runs, workers, chunk, progress, stopped)
         seconds = time.perf_counter() - begun
         write(folder, experiment, compiled, totals, seconds, threads, stopped, bounds)
     return Results(folder.path)
 
 
 def _workers(
-    experiment: Experiment, compiled: Compiled, runs: int, threads: int, dask: str | None
+    experiment: Experiment, compiled: Compiled, runs: int, threads: int, opened: Future[Opened] | None
 ) -> AbstractContextManager[Workers]:
     """Threads of this process, or the workers of a cluster."""
-    if dask is None:
+    if opened is None:
         return Threads(compiled, runs, threads)
     decides, allowed = tuple(numerics(compiled).items()), tuple(experiment.plugins)
-    return dask_workers(dask, Task(experiment.resolved_yaml(), runs, decides, allowed))
+    task = Task(experiment.resolved_yaml(), runs, decides, allowed)
+    return Dask(opened.result().client, task)
 
 
 def _identified(experiment: Experiment, program: str) -> Experiment:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import importlib
 import os
 import signal
 import threading
@@ -102,5 +103,6 @@ def _refuse_differences(compiled: Compiled, expected: dict[str, str]) -> None:
 
 def dask_setup(worker: Any) -> None:
     """As a preload of local workers: a Ctrl-C in the terminal is the business of the run alone, which then stops in
-    order."""
+    order. And what takes seconds to load is loaded by all workers at once, while the client compiles."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    importlib.import_module("nlbench.engine.problem")

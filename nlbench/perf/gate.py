@@ -15,6 +15,7 @@ from nlbench.perf.verdict import SLOWER, UNDECIDED, Change, Estimate, change, es
 ROUNDS = 15
 MOST_ROUNDS = 120  # of a batch
 RECORDED_BAND = 0.01  # that a baseline should have: it enters every later comparison
+RECORDED_ROUNDS = 480  # at most, for that: it is recorded once
 NEW, COUNTS = "new", "counts rose"
 FAILURES = (SLOWER, COUNTS)
 Rounds = Callable[[Sequence[str], int], Mapping[str, np.ndarray]]
@@ -33,7 +34,7 @@ class Finding(NamedTuple):
 
 def measured(rounds: Rounds, names: Sequence[str], wanted: float = math.inf) -> dict[str, Estimate]:
     """Estimates whose bands are at most `wanted`, if the limit of rounds allows."""
-    return _batch(rounds, names, lambda _, now: now.band > wanted)
+    return _batch(rounds, names, lambda _, now: now.band > wanted, RECORDED_ROUNDS)
 
 
 def disturbed(recorded: Mapping[str, Estimate]) -> list[str]:
@@ -80,9 +81,12 @@ def _decided(rounds: Rounds, names: Sequence[str], baseline: Baseline, budget: f
 
 
 def _batch(
-    rounds: Rounds, names: Sequence[str], unsettled: Callable[[str, Estimate], bool]
+    rounds: Rounds,
+    names: Sequence[str],
+    unsettled: Callable[[str, Estimate], bool],
+    most: int = MOST_ROUNDS,
 ) -> dict[str, Estimate]:
-    """Estimates from as many rounds as each workload needs, `MOST_ROUNDS` at most."""
+    """Estimates from as many rounds as each workload needs, `most` at most."""
     seconds: dict[str, np.ndarray] = {}
     estimates: dict[str, Estimate] = {}
     left = list(names)
@@ -90,9 +94,7 @@ def _batch(
         for name, more in rounds(left, ROUNDS).items():
             seconds[name] = np.concatenate([seconds[name], more]) if name in seconds else more
             estimates[name] = estimate(seconds[name])
-        left = [
-            name for name in left if len(seconds[name]) < MOST_ROUNDS and unsettled(name, estimates[name])
-        ]
+        left = [name for name in left if len(seconds[name]) < most and unsettled(name, estimates[name])]
     return estimates
 
 

@@ -176,14 +176,13 @@ def test_a_worker_with_another_environment_is_a_fault_of_it(workers, error):
         workers(error).submit(0, 1).result(20)
 
 
-def test_a_scheduler_that_needs_certificates_is_an_error_in_a_line(task):
+def test_a_scheduler_that_needs_certificates_is_an_error_in_a_line():
     pytest.importorskip("distributed")
-    connected = cluster.dask_workers("tls://127.0.0.1:9", task)
     with (
+        cluster.opening("tls://127.0.0.1:9") as opened,
         pytest.raises(EnvironmentFault, match=r"no dask scheduler answers at tls://127.0.0.1:9: ."),
-        connected,
     ):
-        pass
+        opened.result()
 
 
 class KillOneWorker:
@@ -246,10 +245,10 @@ def test_a_scheduler_that_does_not_answer_is_said(tmp_path, monkeypatch):
 
 
 @pytest.mark.long
-def test_a_second_cluster_starts_without_a_warning(task):
+def test_a_second_cluster_starts_without_a_warning():
     pytest.importorskip("distributed")
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        with cluster.dask_workers("local:1", task) as one, cluster.dask_workers("local:1", task) as other:
-            assert (one.at_once, other.at_once) == (1, 1)
+        with cluster.opening("local:1") as one, cluster.opening("local:1") as other:
+            assert [sum(each.result().client.nthreads().values()) for each in (one, other)] == [1, 1]
     assert not [each for each in said if "Port" in str(each.message)]

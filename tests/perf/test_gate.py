@@ -58,6 +58,7 @@ def test_noise_never_makes_a_regression_of_no_change(noise):
 def test_a_baseline_of_a_busy_machine_is_told_from_another(noise, expected):
     recorded = gate.measured(Machine(3, noise), ["a"], gate.RECORDED_BAND)
     assert gate.disturbed(recorded) == expected
+    assert (recorded["a"].rounds == gate.RECORDED_ROUNDS) == bool(expected)
 
 
 def test_says_undecided_where_the_noise_is_too_large_and_stops():
