@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from html import escape
-from io import BytesIO
+from io import BytesIO, StringIO
 from typing import TYPE_CHECKING, NamedTuple
 
 from nlbench.names import of_file
@@ -34,15 +34,20 @@ class Picture(NamedTuple):
 
 def settle(picture: Picture) -> Picture:
     """The picture with its layout computed once, for all formats."""
-    picture.figure.draw_without_rendering()
+    engine = picture.figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(picture.figure)
     picture.figure.set_layout_engine("none")
     return picture
 
 
 def png(picture: Picture) -> bytes:
     """The picture as PNG, without the version of the software that drew it."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     buffer = BytesIO()
-    picture.figure.savefig(buffer, format="png", dpi="figure", metadata={"Software": None})
+    # Not by `savefig`, which would draw the figure once more for its layout.
+    FigureCanvasAgg(picture.figure).print_png(buffer, metadata={"Software": None})
     return buffer.getvalue()
 
 
@@ -51,9 +56,12 @@ def svg(picture: Picture) -> bytes:
 
     Identifiers carry the picture's name, and no style element speaks about the rest of the page.
     """
-    buffer = BytesIO()
-    picture.figure.savefig(buffer, format="svg", metadata=NO_METADATA)
-    text = buffer.getvalue().decode()
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    buffer, dpi = StringIO(), picture.figure.dpi
+    FigureCanvasSVG(picture.figure).print_svg(buffer, metadata=NO_METADATA)
+    picture.figure.dpi = dpi  # which it sets to that of SVG
+    text = buffer.getvalue()
     text = re.sub(
         r"<defs>\s*<style type=\"text/css\">.*?</style>\s*</defs>\s*", "", text, count=1, flags=re.DOTALL
     )
