@@ -26,6 +26,13 @@ def drawn(tmp_path_factory):
     return figures.draw(run)
 
 
+@pytest.fixture(scope="module")
+def undiverged(tmp_path_factory):
+    """A run of one coordinate in which nothing diverged, and the paths of its figures."""
+    run = synthetic_run.results(tmp_path_factory.mktemp("undiverged"))
+    return run, figures.draw(run)
+
+
 def test_every_figure_is_drawn_for_every_coordinate(drawn):
     expected = {f"{kind}-{coordinate}" for kind in PER_COORDINATE for coordinate in COORDINATES} | {
         "divergence"
@@ -42,8 +49,9 @@ def test_every_figure_is_drawn_for_every_coordinate(drawn):
     assert all(path.exists() for path in drawn)
 
 
-def test_the_same_tables_give_the_same_bytes(tmp_path):
-    first, second = (figures.draw(synthetic_run.results(tmp_path / name)) for name in "ab")
+def test_the_same_tables_give_the_same_bytes(undiverged, tmp_path):
+    _, first = undiverged
+    second = figures.draw(synthetic_run.results(tmp_path))
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
     assert len(first) == 8
 
@@ -74,13 +82,13 @@ def test_identifiers_of_two_figures_do_not_collide(drawn):
             seen |= set(here)
 
 
-def test_what_nothing_diverged_in_has_no_figure_of_divergence(tmp_path):
-    names = {path.stem for path in figures.draw(synthetic_run.results(tmp_path))}
-    assert names == {"rms-x", "mean_error-x", "variance-x", "third_moment-x"}
+def test_what_nothing_diverged_in_has_no_figure_of_divergence(undiverged):
+    _, drawn = undiverged
+    assert {path.stem for path in drawn} == {"rms-x", "mean_error-x", "variance-x", "third_moment-x"}
 
 
 def test_pictures_that_a_run_no_longer_has_are_removed(tmp_path):
-    run = synthetic_run.results(tmp_path)
+    run = synthetic_run.results(tmp_path, figures=["mean_error"])
     stale, kept = tmp_path / "figures" / "divergence.svg", tmp_path / "figures" / "notes.txt"
     stale.parent.mkdir()
     for path in (stale, kept):
@@ -98,10 +106,10 @@ def test_so_are_pictures_that_the_experiment_no_longer_asks_for(tmp_path):
     assert {path.stem for path in (tmp_path / "figures").glob("*")} == {"mean_error-x", "final-x"}
 
 
-def test_what_is_drawn_on_request_is_not_drawn_without_one(tmp_path):
+def test_what_is_drawn_on_request_is_not_drawn_without_one(undiverged):
     assert set(figures.ON_REQUEST) == {"density", "response", "final"}
-    run = synthetic_run.results(tmp_path, {"first": 1.0, "second": 1.1})
-    assert "final-x" not in {path.stem for path in figures.draw(run)}
+    run, drawn = undiverged
+    assert "final-x" not in {path.stem for path in drawn}
     assert "final-x" in {path.stem for path in figures.draw(run, ["final"])}
 
 

@@ -60,8 +60,8 @@ def test_the_unit_of_time_can_be_any(tmp_path):
 
 
 def test_runs_that_are_no_longer_traced_lose_their_figures(tmp_path):
-    figures.draw(results(tmp_path, table()))
-    figures.draw(results(tmp_path, table(runs=(5,))))
+    figures.draw(results(tmp_path, table(), figures=["trace"]))
+    figures.draw(results(tmp_path, table(runs=(5,)), figures=["trace"]))
     assert {path.stem for path in (tmp_path / "figures").glob("trace*")} == {"trace-5"}
 
 

@@ -104,7 +104,9 @@ def test_a_changed_verdict_ends_with_three(first, folder):
     assert facts["exit_code"] == 3
     assert [each["entry"] for each in facts["changed"]] == ["figure 2"]
     assert reproduce(folder, "--record", "--figure", "2").returncode == 0
-    assert reproduce(folder).returncode == 0
+    rows = {row["entry"]: row["verdict"] for row in table(folder / "out" / "reproduction" / "recorded.csv")}
+    assert rows["figure 2"] == "REPRODUCED (claims only)"
+    assert len(rows) == 4
     small_source.write(folder / "configs")
 
 
