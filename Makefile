@@ -3,7 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
-INSTALL := $(PIP) install --require-hashes --only-binary :all: -r
+# Bytecode is made of what is used, when it is first used: of everything it takes longer than to install it.
+INSTALL := $(PIP) install --no-compile --require-hashes --only-binary :all: -r
 LOCK := uv pip compile --quiet --universal --generate-hashes --no-annotate --no-header --python-version 3.11
 EXPERIMENT ?= configs/quickstart.yaml
 OPTIONS ?=
