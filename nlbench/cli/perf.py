@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from nlbench.perf.baseline import Baseline
     from nlbench.perf.gate import Finding
 
-BUDGET = "25%"
+BUDGET = "15%"
 STYLES = {"pass": "green", "slower": "red", "counts rose": "red", "undecided": "yellow"}
 
 
@@ -30,7 +30,7 @@ def perf(
     ] = None,
     budget: Annotated[
         str | None,
-        typer.Option("--budget", metavar="P%", help="How much slower a workload may become [25%]."),
+        typer.Option("--budget", metavar="P%", help="How much slower a workload may become [15%]."),
     ] = None,
     record: Annotated[bool, typer.Option("--record", help="Write the baseline.")] = False,
     plugins: options.Plugin = None,
@@ -96,7 +96,7 @@ def perf(
 
 
 def _fraction(text: str) -> float:
-    """25% or 0.25. Raises `ConfigError`."""
+    """15% or 0.15. Raises `ConfigError`."""
     number = text.strip()
     try:
         value = float(number.removesuffix("%")) / (100 if number.endswith("%") else 1)
@@ -104,7 +104,7 @@ def _fraction(text: str) -> float:
         value = math.nan
     if not 0 < value <= 10:
         raise ConfigError(
-            f"--budget: expected a percentage above 0 and up to 1000, such as 25%; got '{text}'"
+            f"--budget: expected a percentage above 0 and up to 1000, such as 15%; got '{text}'"
         )
     return value
 
