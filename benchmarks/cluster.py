@@ -62,6 +62,9 @@ def calls(experiment: config.Experiment, runs: int, rounds: int) -> list[list[fl
 
 def whole(experiment: config.Experiment, number: int) -> float:
     """Seconds of a run from nothing with that many workers."""
+    from nlbench.engine.compiled import forget_programs
+
+    forget_programs()
     with tempfile.TemporaryDirectory() as out:
         begun = time.perf_counter()
         engine.run(experiment, out, dask=f"local:{number}")

@@ -40,8 +40,8 @@ def _compile_quickly(config):
     """Compilation is most of what tests of the engine do, and half of that are LLVM's optimisation and the newer of
     XLA's two ways to write fused loops.
 
-    Long tests, which measure, and programs that `small_runs.python` starts are compiled as users have them, and so is
-    everything where XLA_FLAGS says so. A test in `tests/runtime` shows that numbers are the same, to rounding.
+    Long tests, which measure, are compiled as users have them, and so is everything where XLA_FLAGS says so. A test in
+    `tests/runtime` shows that numbers are the same, to rounding.
     """
     if config.option.markexpr == "not long":
         os.environ.setdefault("XLA_FLAGS", QUICK)

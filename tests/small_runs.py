@@ -35,13 +35,15 @@ def table_bytes(folder: Path) -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in files if file.stem in STABLE}
 
 
-def python(program: str, *arguments: str, xla_flags: str = "", **options: Any) -> subprocess.CompletedProcess:
-    """Run a program in a process of its own, with all of XLA's threads."""
+def python(
+    program: str, *arguments: str, xla_flags: str | None = None, **options: Any
+) -> subprocess.CompletedProcess:
+    """Run a program in a process of its own, with all of XLA's threads; it compiles as the tests do, unless said."""
     plain = {name: value for name, value in os.environ.items() if name != "PJRT_NPROC"}
     environment = {
         **plain,
         "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
-        "XLA_FLAGS": xla_flags,
+        "XLA_FLAGS": os.environ.get("XLA_FLAGS", "") if xla_flags is None else xla_flags,
     }
     return subprocess.run(
         [sys.executable, "-c", program, *arguments],

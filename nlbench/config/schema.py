@@ -285,4 +285,11 @@ class Experiment(Section):
 
     def of_runs(self, runs: int) -> Experiment:
         """The same with so many runs."""
-        return self.model_copy(update={"monte_carlo": self.monte_carlo.model_copy(update={"runs": runs})})
+        return self._drawing(runs=runs)
+
+    def of_seed(self, seed: int) -> Experiment:
+        """The same with another seed."""
+        return self._drawing(seed=seed)
+
+    def _drawing(self, **numbers: int) -> Experiment:
+        return self.model_copy(update={"monte_carlo": self.monte_carlo.model_copy(update=numbers)})

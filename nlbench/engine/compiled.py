@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import threading
 import time
+from collections import OrderedDict
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,6 +22,9 @@ if TYPE_CHECKING:
 CAPACITY = (
     64  # blocks of a call at most; one size for all, since XLA may compile another one to other last bits
 )
+PROGRAMS = 4  # kept in a process
+_kept: OrderedDict[str, Compiled] = OrderedDict()  # the one used last is the last
+_one_compiles = threading.Lock()
 
 
 class Compiled(NamedTuple):
@@ -48,6 +53,31 @@ class Compiled(NamedTuple):
 
 
 def compile_chunks(problem: Problem, seed: int) -> Compiled:
+    """The program of a problem: the one that this process made before, if it did, or else a new one.
+
+    So who runs, tops up, replays and verifies an experiment in one process, with one seed or many, waits once.
+    """
+    name = problem.same
+    if name is None:
+        return compile_anew(problem, seed)
+    begun = time.perf_counter()
+    with _one_compiles:
+        if name in _kept:
+            _kept.move_to_end(name)
+            return _kept[name]._replace(seed=words(seed), seconds=time.perf_counter() - begun)
+        made = _kept[name] = compile_anew(problem, seed)
+        if len(_kept) > PROGRAMS:
+            _kept.popitem(last=False)
+    return made
+
+
+def forget_programs() -> None:
+    """Let the next run compile anew whatever this process made before."""
+    with _one_compiles:
+        _kept.clear()
+
+
+def compile_anew(problem: Problem, seed: int) -> Compiled:
     """Compile the block computation for every device; the persistent cache keeps the result for the next process."""
     use_cache()
     seed_words = words(seed)

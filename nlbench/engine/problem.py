@@ -43,7 +43,8 @@ class Problem(NamedTuple):
     """Everything that a block's computation depends on, apart from the seed.
 
     truth: what makes the data. judged_by: whose coordinates and rules of divergence count. nominal_steps: ends of the
-    steps at which sightings are made, where the undisturbed motion decides it.
+    steps at which sightings are made, where the undisturbed motion decides it. same: problems for which this is equal
+    are computed by the same program; None where no name holds all that decides it.
     """
 
     truth: System | DiscreteSystem
@@ -53,6 +54,7 @@ class Problem(NamedTuple):
     block: int
     judged_by: System | DiscreteSystem
     nominal_steps: tuple[int, ...] = ()
+    same: str | None = None
 
     @property
     def set_size(self) -> int:
@@ -92,7 +94,9 @@ def make(experiment: Experiment, own: System | DiscreteSystem | None = None) -> 
     if experiment.engine.precision == "float32":
         single_precision.check(tuple(runners), times, () if own else _units(experiment.system.name))
     steps = _nominal_steps(truth, times)
-    return Problem(truth, tuple(runners), times, layout, experiment.engine.block, stated, steps)
+    # Of a plug-in the hash holds the source, but not what that imports or reads.
+    same = None if own is not None or experiment.plugins else experiment.of_seed(0).hash12()
+    return Problem(truth, tuple(runners), times, layout, experiment.engine.block, stated, steps, same)
 
 
 def _units(system: str) -> tuple[str, ...]:

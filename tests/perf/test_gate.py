@@ -117,7 +117,7 @@ def test_xla_gets_one_thread_whose_time_alone_is_counted():
         "for _ in range(40): f(x).block_until_ready()\n"
         "print((time.process_time() - cpu) / (time.perf_counter() - wall))"
     )
-    done = python(program)
+    done = python(program, xla_flags="")
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) < 1.2
 

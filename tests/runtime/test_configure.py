@@ -15,7 +15,7 @@ from tests.small_runs import python
 
 
 def output(program, **options):
-    done = python(program, **options)
+    done = python(program, **{"xla_flags": "", **options})
     assert done.returncode == 0, done.stderr
     return done
 

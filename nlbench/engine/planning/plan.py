@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from nlbench import runtime
 from nlbench.engine import cost
 from nlbench.engine.bounds import bounds_table
-from nlbench.engine.compiled import compile_chunks
+from nlbench.engine.compiled import compile_anew
 from nlbench.engine.finish import of_totals
 from nlbench.engine.planning import machine, sizes
 from nlbench.engine.planning.calibration import calibrate, extend
@@ -57,12 +57,13 @@ def plan(
     """Counts; seconds, bytes of memory and bytes of disk by part, the last entry of each their sum.
 
     What lies in `out` is taken off: finished runs, and those of a checkpoint (of a user's own system neither is looked
-    for). Nothing is written but the cache of compiled programs. Raises what `run` would raise before it computes.
+    for). Nothing is written but the cache of compiled programs. The program is compiled anew, as in another process.
+    Raises what `run` would raise before it computes.
     """
     problem, stated = _timed(lambda: make(experiment, own))
     before = machine.resident()
     with listening() as heard:
-        compiled, seconds = _timed(lambda: compile_chunks(problem, experiment.monte_carlo.seed))
+        compiled, seconds = _timed(lambda: compile_anew(problem, experiment.monte_carlo.seed))
     after = machine.resident()
     threads = experiment.engine.threads or runtime.threads()
     folder = RunFolder(experiment.folder(out)) if own is None else None
