@@ -65,12 +65,12 @@ def compare(
         raise ConfigError("--statistic and --all exclude each other")
     if markdown and json:
         raise ConfigError("--markdown and --json exclude each other")
-    numbers = _number("--margin", margin), _number("--alpha", alpha)
+    allowed, level = options.fractions({"--margin": margin, "--alpha": alpha})
     folders = saved.found(a, settings, out), saved.found(b, settings, out)
     from nlbench.cli import compared as shown
     from nlbench.comparison.compared import Asked, compared
 
-    found = compared(*folders, Asked(*numbers, "all" if everything else statistic))
+    found = compared(*folders, Asked(allowed, level, "all" if everything else statistic))
     failing = len(found.failing(two_sided)) > 0
     faults = [GateError(f"gate failed: {shown.verdict(found, two_sided)}")] if failing else []
     if json:
@@ -81,11 +81,3 @@ def compare(
         shown.show(found, two_sided)
     if faults:
         raise faults[0]
-
-
-def _number(option: str, text: str) -> float:
-    """A number, or a percentage."""
-    try:
-        return float(text.removesuffix("%")) / 100 if text.endswith("%") else float(text)
-    except ValueError:
-        raise ConfigError(f"{option}: expected a number or a percentage such as 1%, got '{text}'") from None

@@ -105,6 +105,23 @@ def precision(text: str | None, runs: str | None) -> PrecisionAsked | None:
     return None if text is None else parse(text)
 
 
+def fractions(given: Mapping[str, str]) -> list[float]:
+    """The values of options that are numbers or percentages: 0.15 or 15%. Raises `ConfigError` for all that are not."""
+    from nlbench.errors import ConfigError, Problem
+
+    values, wrong = [], []
+    for option, text in given.items():
+        number = text.strip()
+        try:
+            values.append(float(number.removesuffix("%")) / (100 if number.endswith("%") else 1))
+        except ValueError:
+            message = f"expected a number or a percentage such as 1%, found '{text}'"
+            wrong.append(Problem(message, file=option))
+    if wrong:
+        raise ConfigError(wrong)
+    return values
+
+
 def words(given: Mapping[str, str | None]) -> list[str]:
     """Options with their values as the words of a command line, without those that are not given."""
     return [word for name, value in given.items() if value is not None for word in (name, value)]

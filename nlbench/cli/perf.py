@@ -40,7 +40,7 @@ def perf(
 
     Exits with 3 if one became slower beyond the budget, or its program grew.
     """
-    allowed = _fraction(budget or BUDGET)
+    allowed = _allowed(budget or BUDGET)
     from nlbench.perf import timing
 
     timing.on_one_thread()  # before jax starts, as the check of a plug-in has it do
@@ -95,17 +95,11 @@ def perf(
         raise faults[0]
 
 
-def _fraction(text: str) -> float:
-    """15% or 0.15. Raises `ConfigError`."""
-    number = text.strip()
-    try:
-        value = float(number.removesuffix("%")) / (100 if number.endswith("%") else 1)
-    except ValueError:
-        value = math.nan
+def _allowed(budget: str) -> float:
+    """What a workload may become slower by, as a fraction. Raises `ConfigError`."""
+    (value,) = options.fractions({"--budget": budget})
     if not 0 < value <= 10:
-        raise ConfigError(
-            f"--budget: expected a percentage above 0 and up to 1000, such as 15%; got '{text}'"
-        )
+        raise ConfigError(f"--budget: expected above 0% and up to 1000%, found '{budget}'")
     return value
 
 

@@ -183,16 +183,21 @@ def _fitting(
     times: Schedule,
     at: str,
 ) -> Runner:
-    """A filter, the one at `at`, whose model fits the data. Raises `ConfigError` for another."""
+    """A filter, the one at `at`, whose model fits the data. Raises `ConfigError` with all that is wrong with it."""
     model = models(spec)
     expected, found = _described(truth), _described(model)
     if found != expected:
         raise ConfigError(f"{spec.label}: its model has {found}, the data {expected}")
-    initial = overridden(model.initial, experiment.initial, spec.initial, at)
-    options = {**spec.options, "missing": False}
+    problems, initial, options = Problems(), model.initial, {**spec.options, "missing": False}
+    with problems.of(at):
+        initial = overridden(model.initial, experiment.initial, spec.initial, at)
     if kind(model).continuous:
-        options["step"] = _only_step(spec, times)
-    return _bound(spec.label, spec.name, model, options, initial, times)
+        with problems.of(at):
+            options["step"] = _only_step(spec, times)
+    with problems.of(at):
+        runner = _bound(spec.label, spec.name, model, options, initial, times)
+    problems.refuse()
+    return runner
 
 
 def _described(system: System | DiscreteSystem) -> str:

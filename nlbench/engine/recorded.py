@@ -143,13 +143,19 @@ def _bound(experiment: Experiment, spec: FilterSpec, at: str) -> Filter:
         raise ConfigError(
             f"{spec.label}: the system is measured at angles, and recorded data have times only"
         )
-    initial = overridden(system.initial, experiment.initial, spec.initial, at)
+    problems = Problems()
+    with problems.of(at):
+        initial = overridden(system.initial, experiment.initial, spec.initial, at)
+        system = replace(system, initial=initial)
     options: dict[str, Any] = dict(spec.options)
     if "missing" in options:
         options["missing"] = True
     if not kind(system).discrete and "step" in options:
         options["step"] = options["step"] or experiment.time.step
-    return filters.build(spec.name, replace(system, initial=initial), **options)
+    with problems.of(at):
+        f = filters.build(spec.name, system, **options)
+    problems.refuse()
+    return f
 
 
 def _misfit(label: str, f: Filter, recording: Recording) -> Iterator[Problem]:

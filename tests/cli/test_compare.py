@@ -60,9 +60,10 @@ def test_margins_are_numbers_or_percentages(folder):
     a, b = folder("a"), folder("b", 1.03)
     for margin in ("4%", "0.04", "4 %"):
         assert compare(a, b, "--margin", margin).exit_code == 0
-    wrong = compare(a, b, "--margin", "much")
+    wrong = compare(a, b, "--margin", "much", "--alpha", "%")
     assert wrong.exit_code == 2
-    assert "--margin: expected a number or a percentage such as 1%, got 'much'" in wrong.stderr
+    assert "--margin: expected a number or a percentage such as 1%, found 'much'" in wrong.stderr
+    assert "--alpha: expected a number or a percentage such as 1%, found '%'" in wrong.stderr
     assert compare(a, b, "--alpha", "0").exit_code == 2
 
 

@@ -188,6 +188,16 @@ def test_everything_wrong_with_both_files_is_said_at_once_and_nothing_is_written
     assert sorted(path.name for path in tmp_path.iterdir()) == ["data.csv", "fig.yaml"]
 
 
+def test_a_start_that_does_not_fit_hides_no_option_that_does_not(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    filters = "[{name: ukf, kappa: -30, initial: {mean: [1, 2]}}]"
+    written(tmp_path, f"experiment: mine\nsystem: culver-scalar\nfilters: {filters}\n")
+    done = invoke("fig.yaml", written(tmp_path, "time,a\n1,1\n", "data.csv").name)
+    assert done.exit_code == 2
+    assert "filters.0.initial.mean: got shape (2,), the system needs (1,)" in done.stderr
+    assert "ukf.kappa: -30.0 must be above -1" in done.stderr
+
+
 @pytest.mark.parametrize(
     ("config", "text", "options", "says"),
     [

@@ -13,7 +13,7 @@ system: oscillator
 filters:
   - ekf
   - {name: third-order, initial: {mean: [1, 2]}}
-  - {name: ukf, kappa: -30}
+  - {name: ukf, kappa: -30, initial: {variance: [1]}}
   - {name: direct-2, points: 101}
   - {name: statistical-linearisation, points: 50}
   - {name: gaussian-sum, components: 50}
@@ -23,6 +23,7 @@ claims:
 COORDINATE = "'A' is about the coordinate 'positon', which the system does not have; did you mean 'position'?"
 PROBLEMS = {
     (6, 41): "filters.1.initial.mean: got shape (2,), the system needs (3,)",
+    (7, 29): "filters.2.initial.cov: got shape (1, 1), the system needs (3, 3)",
     (7, 5): "filters.2: ukf.kappa: -30.0 must be above -3",
     (8, 5): "filters.3: direct-2.points: 101 along each of 3 states are more than 1,000,000 nodes",
     (9, 5): "filters.4: points: 50^3 = 125000 points; a product rule takes at most 100000",

@@ -84,8 +84,9 @@ def test_what_is_no_baseline_is_refused(tmp_path, text):
     [
         (["--baseline", "none.json"], "none.json: cannot read the baseline: no such file or directory"),
         (["--baseline", "none.json", "--budget", "9%"], "none.json: cannot read the baseline: no such file"),
-        (["--budget", "x"], "--budget: expected a percentage"),
-        (["--budget", "0%"], "--budget: expected a percentage"),
+        (["--budget", "x"], "--budget: expected a number or a percentage such as 1%, found 'x'"),
+        (["--budget", "0%"], "--budget: expected above 0% and up to 1000%, found '0%'"),
+        (["--budget", "nan"], "--budget: expected above 0% and up to 1000%, found 'nan'"),
         (["none.yaml"], "none.yaml: cannot read the experiment"),
     ],
 )
