@@ -17,9 +17,13 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Before anything of nlbench is imported: the hook decorates every function of these packages; not of `algebra`,
-# which is called thousands of times for each program that is traced, so that tests took a fifth longer.
-NUMERICAL = "continuous discrete engine filters moments references simulate statistics systems updates"
-install_import_hook([f"nlbench.{package}" for package in NUMERICAL.split()], "beartype.beartype")
+# which is called thousands of times for each program that is traced, so that tests took a fifth longer, and of
+# `statistics` only where shapes are stated: a function within a function is decorated anew by each call.
+NUMERICAL = "continuous discrete engine filters moments references simulate systems updates"
+STATISTICS = "accumulate score_sums tracks"
+CHECKED = [f"nlbench.{package}" for package in NUMERICAL.split()]
+CHECKED += [f"nlbench.statistics.{module}" for module in STATISTICS.split()]
+install_import_hook(CHECKED, "beartype.beartype")
 
 import jax  # noqa: E402 - the hook comes first
 
@@ -45,6 +49,8 @@ def _compile_quickly(config):
     """
     if config.option.markexpr == "not long":
         os.environ.setdefault("XLA_FLAGS", QUICK)
+        # Workers beside each other again: threads that spin make the roots of a polynomial take 1 s instead of 8 ms.
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for the workers, which load it after this
     runtime.prepare()
 
 

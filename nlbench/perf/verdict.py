@@ -10,6 +10,7 @@ wide. A change is the difference to the baseline's estimate, its band the root o
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -72,6 +73,7 @@ def _median(values: np.ndarray) -> tuple[float, float]:
     return middle, float(max(middle - ordered[low], ordered[n - 1 - low] - middle))
 
 
+@cache
 def rank(n: int) -> int:
     """The largest k, from 0, for which the values numbered k and n - 1 - k of n in order hold the median with 99 %."""
     below, k = 0.0, 0

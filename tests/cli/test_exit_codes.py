@@ -45,12 +45,13 @@ def command(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[st
         (["report", "good.yaml"], "no results in results/culver/hermite-01/"),
     ],
 )
-def test_a_mistake_ends_with_two_and_writes_nothing(tmp_path, arguments, message):
+def test_a_mistake_ends_with_two_and_writes_nothing(tmp_path, monkeypatch, arguments, message):
+    monkeypatch.chdir(tmp_path)
     written(tmp_path, VALID, "good.yaml")
     written(tmp_path, spoiled("limiter", "limter"), "bad.yaml")
     written(tmp_path, VALID[: VALID.index("claims:")], "noclaims.yaml")
-    done = command(*arguments, cwd=tmp_path)
-    assert done.returncode == 2
+    done = CliRunner().invoke(app, arguments, env={"COLUMNS": "80"})
+    assert done.exit_code == 2
     assert message in done.stderr
     assert "Traceback" not in done.stderr
     assert done.stdout == ""

@@ -29,12 +29,20 @@ import sys, nlbench, nlbench.config, nlbench.errors, nlbench.systems, nlbench.fi
 [catalogue.options(name) for name in catalogue.available()]
 sys.exit(str([name for name in {HEAVY} if name in sys.modules]) if set({HEAVY}) & set(sys.modules) else 0)
 """
+REPORT_THREADS = """
+import os
+from nlbench.cli import main
+try:
+    main()
+finally:
+    print(os.environ["OPENBLAS_NUM_THREADS"])
+"""
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
 
 
-def python(*arguments: str) -> subprocess.CompletedProcess[str]:
+def python(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
     line = [sys.executable, *arguments]
-    return subprocess.run(line, capture_output=True, text=True, env=ENVIRONMENT, check=False)
+    return subprocess.run(line, capture_output=True, text=True, env=ENVIRONMENT | variables, check=False)
 
 
 @pytest.mark.parametrize(
@@ -71,6 +79,13 @@ def test_nothing_heavy_is_loaded(tmp_path, monkeypatch, arguments, code):
 def test_the_package_and_its_registries_load_nothing_heavy():
     done = python("-c", REGISTRIES)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(("chosen", "found"), [(None, "1"), ("3", "3")])
+def test_linear_algebra_has_one_thread_unless_the_user_says_otherwise(monkeypatch, chosen, found):
+    monkeypatch.delitem(ENVIRONMENT, "OPENBLAS_NUM_THREADS", raising=False)
+    done = python("-c", REPORT_THREADS, "--version", **({"OPENBLAS_NUM_THREADS": chosen} if chosen else {}))
+    assert done.stdout.splitlines()[-1] == found
 
 
 def test_a_bad_file_is_answered_in_less_time_than_jax_takes_to_load(tmp_path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 from tests.small_runs import python
 
 TWO = """
@@ -29,7 +31,8 @@ print(workers.at_once, *sorted(set(called)))
 
 
 def test_each_of_two_devices_computes():
-    done = python(TWO, xla_flags="--xla_force_host_platform_device_count=2")
+    flags = os.environ.get("XLA_FLAGS", "")
+    done = python(TWO, xla_flags=f"{flags} --xla_force_host_platform_device_count=2")
     assert done.returncode == 0, done.stderr
     first, second, used = done.stdout.split("\n")[:3]
     assert first != second
