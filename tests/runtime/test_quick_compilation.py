@@ -20,7 +20,7 @@ ORBIT = {
 SCALAR = {
     "experiment": "scalar",
     "system": "culver-scalar",
-    "filters": ["third-order-guarded", "quadrature-2", "bootstrap"],
+    "filters": ["third-order-guarded", "bootstrap"],
     "reference": "exact",
     "time": {"end": 0.5, "step": 0.02, "output": 0.1},
     "report_times": [0.5],
