@@ -38,7 +38,7 @@ def test_a_mistake_in_the_file_too(tmp_path):
         (["validate", "none.yaml", "--json"], 2, None),
         (["plan", "none.yaml", "--json"], 2, "cannot read the experiment"),
         (["compare", "a", "b", "--json"], 2, "a: no such folder of a run"),
-        (["perf", "--budget", "x", "--json"], 2, "--budget: expected a percentage"),
+        (["perf", "--budget", "x", "--json"], 2, "--budget: expected a number or a percentage"),
         (["list", "filters", "efk", "--json"], 2, "did you mean 'ekf'?"),
         (["filter", "none.yaml", "data.csv", "--json"], 2, "cannot read the experiment"),
         (["replay", "none.yaml", "--filter", "ekf", "--trajectory", "0", "--json"], 2, "cannot read"),
