@@ -36,3 +36,19 @@ def checked(model: type[Model], values: Mapping[str, Any], where: str) -> Model:
             else:
                 lines.append(f"{where}.{path}: {problem['msg']} (got {problem['input']!r})")
         raise ConfigError([Problem(line) for line in lines]) from None
+
+
+def refuse_exact(name: str, measurement_cov: Any) -> None:
+    """Raises `ConfigError` for a filter that divides by the noise of measurements, where a direction has none."""
+    import jax
+    import numpy as np
+
+    if isinstance(measurement_cov, jax.core.Tracer):
+        return
+    values, vectors = np.linalg.eigh(np.asarray(measurement_cov, float))
+    if values[0] <= len(values) * np.finfo(float).eps * abs(values[-1]):
+        entry = int(np.argmax(np.abs(vectors[:, 0])))
+        raise ConfigError(
+            f"{name}: measurement_cov has the eigenvalue {values[0]:.3g} (entry [{entry}, {entry}]), and this filter "
+            "needs noise in every direction of a measurement; give it a variance, or take ekf, iekf, ukf or sof"
+        )

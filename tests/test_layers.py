@@ -53,7 +53,7 @@ ALLOWED: dict[str, set[str]] = {
     "plugins": {"errors", "suggestions", "runtime", "row"},
     "continuous.catalogue": {"row", "solvers"},
     "discrete.catalogue": {"row"},
-    "discrete": {"errors", "shapes", *CORE},
+    "discrete": {"errors", "checks", "shapes", *CORE},
     "filters.catalogue": {"plugins", "row", "solvers", "continuous.catalogue", "discrete.catalogue"},
     "references": {"errors", "discrete", "discrete.catalogue", "systems.exact", *CORE},
     "continuous": {"row", "continuous.catalogue", "errors", *CORE},

@@ -19,11 +19,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from nlbench.checks import refuse_exact
 from nlbench.discrete import particles
-from nlbench.discrete.correction import Gaussian, information, predicted
+from nlbench.discrete.correction import Gaussian, information, log_density, predicted
 from nlbench.discrete.mixture import overall
-from nlbench.discrete.points import square_root
 from nlbench.discrete.problem import observation
+from nlbench.discrete.roots import square_root
 from nlbench.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -43,15 +44,21 @@ class Particles(NamedTuple):
 
 
 def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) -> Filter:
-    """`options.particles` particles.
+    """Bind the filter of `options.particles` particles.
 
-    Raises `ConfigError` where noise enters the measurement nonlinearly: its density is then not known.
+    Raises `ConfigError` where y given x has no density that is known: where noise enters the measurement nonlinearly,
+    or not at all.
     """
-    if not observation(system, options).linear:
+    seen = observation(system, options)
+    if not seen.linear:
         raise ConfigError(
             f"{name}: noise enters the measurement nonlinearly, so the density of y given x is not known; "
             "ensemble takes such systems"
         )
+    with jax.ensure_compile_time_eval():
+        mean, nothing = jnp.asarray(system.initial.mean, float), jnp.zeros(len(seen.cov))
+        D = jax.jacfwd(seen.function, 2)(0, mean, nothing)
+        refuse_exact(name, D @ seen.cov @ D.T)
 
     def start(x: Any, key: Any) -> Particles:
         return Particles(x, jnp.full(len(x), -math.log(len(x))), key)
@@ -97,16 +104,11 @@ def _weighed(seen: Observation, prior: Particles, t: Any, y: Any) -> tuple[Parti
     d = jax.vmap(lambda h: seen.innovation(h, centre))(h)
     foretold_z = overall(weights, Gaussian(d, R))
 
-    def log_density(h: Any, R: Any) -> Any:
-        z, S, _, taken = predicted(seen, y, seen.innovation(y, h), R, jnp.zeros((0, len(h))))
-        L = square_root(S)
-        u: list[Any] = []
-        for r in range(len(h)):
-            u.append((z[r] - sum(L[r, s] * u[s] for s in range(r))) / L[r, r])
-        level = sum(each**2 for each in u) + taken * math.log(2 * math.pi)
-        return -0.5 * level - jnp.sum(jnp.log(jnp.diagonal(L)))
+    def gain(h: Any, R: Any) -> Any:
+        z, S, _, taken, _ = predicted(seen, y, seen.innovation(y, h), R, jnp.zeros((0, len(h))))
+        return log_density(z, square_root(S), taken)
 
-    gained = prior.log_weights + jax.vmap(log_density)(h, R)  # (1)
+    gained = prior.log_weights + jax.vmap(gain)(h, R)  # (1)
     total = jax.nn.logsumexp(gained)
     z = seen.innovation(y, centre + foretold_z.mean)
     foretold = predicted(seen, y, z, foretold_z.cov, jnp.zeros((0, len(centre))))

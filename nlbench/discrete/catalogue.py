@@ -8,6 +8,8 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from nlbench.row import Row, StrictOptions
 
+Propagation = Literal["transition", "moments"]
+
 
 class Options(StrictOptions):
     """What all filters of the family take."""
@@ -24,13 +26,23 @@ class GaussianOptions(Options):
     limiter: PositiveFloat | None = Field(default=None, description="clip residuals at this many sigmas")
 
 
-class IteratedOptions(GaussianOptions):
+class PropagatedOptions(GaussianOptions):
+    """Options of a filter whose covariance can be carried as a root."""
+
+    propagation: Propagation = Field(
+        default="transition",
+        description="in continuous time: carry the covariance through the transition of each step, or integrate its "
+        "moment equations",
+    )
+
+
+class IteratedOptions(PropagatedOptions):
     """Options of the iterated filter."""
 
     iterations: PositiveInt = Field(default=5, le=10_000, description="Gauss-Newton iterations of an update")
 
 
-class UnscentedOptions(GaussianOptions):
+class UnscentedOptions(PropagatedOptions):
     """Options of the unscented filter."""
 
     alpha: PositiveFloat = Field(default=1.0, description="spread of the sigma points")
@@ -40,13 +52,13 @@ class UnscentedOptions(GaussianOptions):
     )
 
 
-class QuadratureOptions(GaussianOptions):
+class QuadratureOptions(PropagatedOptions):
     """Options of a filter that integrates by Gauss-Hermite quadrature."""
 
     points: PositiveInt = Field(default=3, ge=2, le=1000, description="nodes per dimension")
 
 
-class MixtureOptions(GaussianOptions):
+class MixtureOptions(PropagatedOptions):
     """Options of the Gaussian sum."""
 
     components: PositiveInt = Field(
@@ -91,7 +103,7 @@ HENRIKSEN = "Henriksen 1980"
 JAZWINSKI = "Jazwinski 1970, as corrected by Henriksen 1980"
 
 
-def _row(says: str, source: str, order: int, update: str, options: type[Options] = GaussianOptions) -> Row:
+def _row(says: str, source: str, order: int, update: str, options: type[Options] = PropagatedOptions) -> Row:
     return Row(says, source, order, update, options, "discrete")
 
 
@@ -109,15 +121,16 @@ ROWS: dict[str, Row] = {
         "Athans, Wishner and Bertolini 1968", 2, "sof",
     ),
     "truncated": _row(
-        "truncated second order, corrected, with state-dependent noise", f"{HENRIKSEN}, 18-22", 2, "truncated"
+        "truncated second order, corrected, with state-dependent noise", f"{HENRIKSEN}, 18-22", 2, "truncated",
+        GaussianOptions,
     ),
     "truncated-jazwinski": _row(
         "truncated second order with the erroneous terms and random forcing",
-        f"{HENRIKSEN}, 11, 16-17", 2, "truncated",
+        f"{HENRIKSEN}, 11, 16-17", 2, "truncated", GaussianOptions,
     ),
     "modified-jazwinski": _row(
         "truncated second order with the erroneous terms, no random forcing",
-        f"{HENRIKSEN}, 11, 22", 2, "truncated",
+        f"{HENRIKSEN}, 11, 22", 2, "truncated", GaussianOptions,
     ),
     "statistical-linearisation": _row(
         "quasi-linear: the best straight line for a Gaussian prior", "Gelb 1974, 6.2", 2, "statistical",

@@ -17,8 +17,8 @@ import jax
 import jax.numpy as jnp
 
 from nlbench.discrete import particles
-from nlbench.discrete.correction import Gaussian, information, predicted, symmetric
-from nlbench.discrete.points import square_root
+from nlbench.discrete.correction import Gaussian, gains, information, predicted, symmetric
+from nlbench.discrete.roots import square_root
 
 if TYPE_CHECKING:
     from nlbench.discrete.problem import Observation
@@ -66,7 +66,8 @@ def _updated(seen: Observation, prior: Ensemble, t: Any, y: Any) -> tuple[Ensemb
     residuals = jax.vmap(lambda h: seen.innovation(y, h))(perturbed)
     if seen.missing:
         residuals = jnp.where(jnp.isnan(y), 0.0, residuals)
-    moved = x + residuals @ jnp.linalg.solve(foretold.S, foretold.C.T)  # (1)
+    weighted, _, C = gains(foretold, residuals.T)
+    moved = x + weighted.T @ C  # (1)
     return Ensemble(moved, key), information(foretold)
 
 

@@ -22,15 +22,15 @@ import jax
 import jax.numpy as jnp
 
 from nlbench.discrete import linearised, second_order
-from nlbench.discrete.correction import Gaussian
-from nlbench.discrete.gaussian import components, gaussian, symmetrised
+from nlbench.discrete.correction import Gaussian, Spread, symmetric
+from nlbench.discrete.gaussian import approximated, components, gaussian
 from nlbench.discrete.mixture import Mixture, joined, laid_out, overall, renewed
-from nlbench.discrete.points import gauss_hermite
 from nlbench.discrete.problem import bends, observation, transition
+from nlbench.discrete.propagation import moment_rates, propagator
+from nlbench.discrete.roots import square_root
 from nlbench.discrete.time import Clock
 from nlbench.errors import ConfigError
 from nlbench.filters.filter import Filter, UpdateInfo
-from nlbench.moments.integrate import fixed_rk4
 from nlbench.moments.moments import Moments
 from nlbench.systems.discrete import DiscreteSystem
 
@@ -38,31 +38,32 @@ if TYPE_CHECKING:
     from nlbench.row import Row
     from nlbench.systems.system import System
 
+MOST = 1000  # Gaussians
+NEEDED = 1430  # bytes for a pair of them in a block of 64 runs, as XLA states it
+
 
 def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) -> Filter:
     """A bank of `options.bank`, `options.components` per dimension; of one where the system is linear."""
     count = options.components if bends(system, options) else 1
-    step, slope, update = linearised.step, linearised.slope, linearised.update
+    step, local, update = linearised.step, linearised.local, linearised.update
     if options.bank == "sof-gaussian":
-        step, slope, update = (
+        step, local, update = (
             partial(function, True)
-            for function in (second_order.step, second_order.slope, second_order.update)
+            for function in (second_order.step, second_order.local, second_order.update)
         )
     seen = observation(system, options)
-    if count > 1:
-        gauss_hermite(system.states, count)  # refuses more than it can lay
+    _refuse_too_many(name, count, system.states)
 
     if isinstance(system, DiscreteSystem):
         motion = transition(system)
-        members = jax.vmap(lambda k, each: symmetrised(step(motion, k, each)), in_axes=(None, 0))
-        clock = Clock.of_steps(lambda state, k: state._replace(each=members(k, state.each)))
+        clock = Clock.of_steps(lambda state, k: _each(lambda prior: step(motion, k, prior), state))
     else:
-        field = jax.vmap(lambda t, each: symmetrised(slope(system, t, each)), in_axes=(None, 0))
-
-        def integrate(state: Mixture, t: Any, h: Any, count: Any) -> Mixture:
-            return state._replace(each=fixed_rk4().integrate(field, t, h, count, state.each))
-
-        clock = Clock.of_integrals(integrate, options.step or system.default_step)
+        around = approximated(local, system)
+        advance = propagator(around, options.propagation)
+        clock = Clock.of_integrals(
+            lambda state, t, h, count: _each(lambda prior: advance(prior, t, h, count), state),
+            options.step or system.default_step,
+        )
 
     def updated(
         state: Mixture, t: Any, y: Any, key: Any = None, sighting: Any = None
@@ -78,7 +79,8 @@ def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) ->
         if clock.discrete:
             raise ConfigError(f"{name}: moments have no time derivatives where time is discrete")
         held = lambda each: whole(state._replace(each=each))  # noqa: E731
-        return Moments(*jax.jvp(held, (state.each,), (field(t, state.each),))[1])
+        slope = jax.vmap(lambda each: moment_rates(around, t, each, square_root(each.cov)))(state.each)
+        return Moments(*jax.jvp(held, (state.each,), (slope,))[1])
 
     sightings = getattr(system, "sightings", None)
     return Filter(
@@ -95,9 +97,44 @@ def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) ->
     )
 
 
+def _refuse_too_many(name: str, count: int, n: int) -> None:
+    """Raises `ConfigError` for more Gaussians than can be compared with each other."""
+    if count**n <= MOST:
+        return
+    fewer = max(each for each in range(1, count) if each**n <= MOST)
+    remedy = (
+        f"components: {fewer} gives {fewer**n:,}"
+        if fewer > 1
+        else "ukf and ensemble take systems of this size"
+    )
+    raise ConfigError(
+        f"{name}.components: {count} along each of {n} states are {count**n:,} Gaussians; to be joined each is "
+        f"compared with every other, which takes {NEEDED * count ** (2 * n) / 1e9:,.3g} GB a block of 64 runs, so that "
+        f"{MOST:,} are the most; {remedy}"
+    )
+
+
+def _each(move: Callable[[Spread], Spread], state: Mixture) -> Mixture:
+    """The mixture whose Gaussians have all moved."""
+    return state._replace(each=jax.vmap(lambda each: _covered(move(_rooted(each))))(state.each))
+
+
+def _rooted(each: Gaussian) -> Spread:
+    return Spread(each.mean, square_root(each.cov))
+
+
+def _covered(each: Spread) -> Gaussian:
+    return Gaussian(each.mean, symmetric(each.cov))
+
+
 def _updated(update: Callable, prior: Mixture, t: Any, y: Any) -> tuple[Mixture, UpdateInfo]:
     """(1)."""
-    each, info = jax.vmap(lambda each: update(t, each, y))(prior.each)
+
+    def one(each: Gaussian) -> tuple[Gaussian, UpdateInfo]:
+        posterior, info = update(t, _rooted(each), y)
+        return _covered(posterior), info
+
+    each, info = jax.vmap(one)(prior.each)
     gained = prior.log_weights + info.log_likelihood  # (1)
     lost = jnp.isnan(gained)
     gained = jnp.where(lost & ~jnp.all(lost), -jnp.inf, gained)
@@ -106,7 +143,8 @@ def _updated(update: Callable, prior: Mixture, t: Any, y: Any) -> tuple[Mixture,
         lambda part: jnp.where(lost.reshape(-1, *[1] * (part.ndim - 1)), part[heaviest], part), each
     )
     total = jax.nn.logsumexp(gained)
-    posterior = Mixture(gained - total, each)
+    # What no member thought possible says nothing of their weights.
+    posterior = Mixture(jnp.where(total == -jnp.inf, prior.log_weights, gained - total), each)
     w = jnp.exp(prior.log_weights)
     z = overall(
         jnp.where(lost, 0.0, w),

@@ -25,4 +25,4 @@ def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) ->
         raise ConfigError(
             f"kalman: {bent} is not linear, or cannot be told to be; ekf takes nonlinear systems"
         )
-    return gaussian.build(name, system, options, linearised.step, linearised.slope, linearised.update)
+    return gaussian.build(name, system, options, linearised.step, linearised.local, linearised.update)

@@ -4,7 +4,7 @@ With A, L the Jacobians of the transition f(k, x, w) in x and w, and C, D those 
 w = v = 0 (Athans 2001, (35)-(38), (48)-(52)):
   (1) m- = f(k, m, 0),  P- = A P A' + L Q L'
   (2) z = y - h(k, m, 0),  S = C P C' + D R D',  cov(x, y) = P C'
-In continuous time, F the Jacobian of the drift:
+In continuous time, F the Jacobian of the drift, for `propagation`:
   (3) dm = f,  dP = F P + P F' + G V G'
 Exact for linear systems. Cost O(n^3). Fails when f or h bend within a standard deviation of the estimate.
 """
@@ -13,9 +13,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from nlbench.discrete.correction import Gaussian, correct, predicted
+from nlbench.discrete.correction import Spread, conditioned, factor, joint
 from nlbench.discrete.expansion import drift, first
-from nlbench.discrete.problem import spectrum
+from nlbench.discrete.problem import noise_columns
+from nlbench.discrete.propagation import Local
+from nlbench.discrete.roots import square_root
 
 if TYPE_CHECKING:
     from nlbench.discrete.problem import Noisy, Observation
@@ -23,22 +25,19 @@ if TYPE_CHECKING:
     from nlbench.systems.system import System
 
 
-def step(motion: Noisy, k: Any, prior: Gaussian) -> Gaussian:
+def step(motion: Noisy, k: Any, prior: Spread) -> Spread:
     """(1)."""
     f = first(motion.function, k, prior.mean, len(motion.cov))
-    return Gaussian(f.value, f.x @ prior.cov @ f.x.T + f.w @ motion.cov @ f.w.T)
+    return Spread(f.value, factor(f.x @ prior.root, f.w @ square_root(motion.cov)))
 
 
-def slope(system: System, t: Any, prior: Gaussian) -> Gaussian:
+def local(system: System, t: Any, mean: Any, columns: Any) -> Local:
     """(3)."""
-    f, F = drift(system, t, prior.mean)
-    FP = F @ prior.cov
-    return Gaussian(f, FP + FP.T + spectrum(system, t, prior.mean))
+    return Local(*drift(system, t, mean), noise_columns(system, t, mean))
 
 
-def update(seen: Observation, t: Any, prior: Gaussian, y: Any) -> tuple[Gaussian, UpdateInfo]:
+def update(seen: Observation, t: Any, prior: Spread, y: Any) -> tuple[Spread, UpdateInfo]:
     """(2)."""
     h = first(seen.function, t, prior.mean, len(seen.cov))
-    C = prior.cov @ h.x.T
-    S = h.x @ C + h.w @ seen.cov @ h.w.T
-    return correct(prior, predicted(seen, y, seen.innovation(y, h.value), S, C), seen.limiter)
+    noise, z = h.w @ square_root(seen.cov), seen.innovation(y, h.value)
+    return conditioned(prior, joint(seen, y, z, noise, h.x @ prior.root, prior.root), seen.limiter)

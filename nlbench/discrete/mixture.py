@@ -3,6 +3,7 @@
 (1) sum w_i N(m_i, P_i) has mean m = sum w_i m_i and covariance sum w_i (P_i + d_i d_i'),  d_i = m_i - m
 (2) joining i and j by (1) raises the Kullback-Leibler discrimination by at most
     ((w_i + w_j) log|P_ij| - w_i log|P_i| - w_j log|P_j|) / 2          (Runnalls 2007, (21))
+    and without bound where i and j are certain of different things
 """
 
 from __future__ import annotations
@@ -14,7 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from nlbench.discrete.correction import Gaussian, symmetric
-from nlbench.discrete.points import gauss_hermite, square_root
+from nlbench.discrete.points import gauss_hermite
+from nlbench.discrete.roots import ldl, square_root
+
+PAIRS = 1024  # whose costs are computed at once: each needs some nine matrices
 
 
 class Mixture(NamedTuple):
@@ -68,9 +72,10 @@ def joined(mixture: Mixture, most: float) -> Mixture:
         both = jax.tree.map(lambda part: part[jnp.stack([i, j])], mixture.each)
         total = jnp.sum(w)
         whole = overall(w / total, both)
-        apart = w[0] * _log_determinant(both.cov[0]) + w[1] * _log_determinant(both.cov[1])
-        cost = (total * _log_determinant(whole.cov) - apart) / 2
-        return total, whole, jnp.where(jnp.all(w > 0) & (i != j), cost, jnp.inf)
+        (together, rank), (first, rank_i), (second, rank_j) = map(_log_determinant, (whole.cov, *both.cov))
+        cost = (total * together - w[0] * first - w[1] * second) / 2
+        free = jnp.all(w > 0) & (i != j) & (rank == jnp.minimum(rank_i, rank_j))
+        return total, whole, jnp.where(free, cost, jnp.inf)
 
     def costs(mixture: Mixture, i: Any) -> Any:
         return jax.vmap(lambda j: pair(mixture, i, j)[2])(jnp.arange(count))
@@ -86,9 +91,11 @@ def joined(mixture: Mixture, most: float) -> Mixture:
         cost = cost.at[i].set(row).at[:, i].set(row).at[j].set(jnp.inf).at[:, j].set(jnp.inf)
         return mixture, cost
 
-    start = jax.vmap(lambda i: costs(mixture, i))(jnp.arange(count))
+    start = jax.lax.map(lambda i: costs(mixture, i), jnp.arange(count), batch_size=max(1, PAIRS // count))
     return jax.lax.while_loop(lambda carry: jnp.min(carry[1]) < most, join, (mixture, start))[0]
 
 
-def _log_determinant(P: Any) -> Any:
-    return 2 * jnp.sum(jnp.log(jnp.diagonal(square_root(P))))
+def _log_determinant(P: Any) -> tuple[Any, Any]:
+    """Logarithm of the determinant of a covariance in the directions in which something varies, and their number."""
+    d = ldl(P).d
+    return jnp.sum(jnp.log(jnp.where(d == 0, 1.0, d))), jnp.sum(d != 0)

@@ -9,8 +9,8 @@ import jax
 import jax.numpy as jnp
 
 from nlbench.discrete.gaussian import components
-from nlbench.discrete.points import square_root
 from nlbench.discrete.problem import observation, stacked, transition
+from nlbench.discrete.roots import square_root
 from nlbench.discrete.time import Clock
 from nlbench.errors import ConfigError
 from nlbench.filters.filter import Filter, UpdateInfo

@@ -7,9 +7,8 @@ With points xi_i (p, d), weights w_i for means and c_i for covariances,
 from __future__ import annotations
 
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 
 from nlbench.errors import ConfigError
@@ -57,20 +56,3 @@ def gauss_hermite(d: int, count: int) -> Points:
     x, w = np.polynomial.hermite_e.hermegauss(count)
     weights = np.array([np.prod(each) for each in product(w / w.sum(), repeat=d)])
     return Points(np.array(list(product(x, repeat=d))), weights, weights)
-
-
-def square_root(P: Any) -> Any:
-    """The lower triangular L with L L' = P, (n, n), column by column; P may be singular.
-
-    A pivot that rounding leaves within n eps of zero makes a column of zeros, a negative one NaN.
-    """
-    n = len(P)
-    L: list[list[Any]] = [[0.0] * n for _ in range(n)]
-    for j in range(n):
-        pivot = P[j, j] - sum(L[j][k] ** 2 for k in range(j))
-        nil = jnp.abs(pivot) <= n * jnp.finfo(P.dtype).eps * jnp.abs(P[j, j])
-        L[j][j] = jnp.where(nil, 0.0, jnp.sqrt(jnp.where(nil, 1.0, pivot)))
-        for i in range(j + 1, n):
-            rest = P[i, j] - sum(L[i][k] * L[j][k] for k in range(j))
-            L[i][j] = jnp.where(nil, 0.0, rest / jnp.where(nil, 1.0, L[j][j]))
-    return jnp.stack([jnp.stack([jnp.asarray(entry, P.dtype) for entry in row]) for row in L])

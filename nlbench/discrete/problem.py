@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from nlbench.algebra import expand
+from nlbench.algebra import breaks, expand
+from nlbench.discrete.roots import square_root
 from nlbench.shapes import stacked
 from nlbench.systems.discrete import DiscreteSystem
 
@@ -66,20 +67,34 @@ def spectrum(system: System, t: Any, x: Any) -> Any:
     return jnp.zeros((n, n)) if system.diffusion is None else system.diffusion_spectrum(t, x)
 
 
+def noise_columns(system: System, t: Any, x: Any) -> Any:
+    """G V^1/2 of a system in continuous time: (n, s), None without process noise."""
+    if system.diffusion is None:
+        return None
+    G = jnp.asarray(system.diffusion(t, x))
+    return G @ density_root(system, G.shape[1])
+
+
+def density_root(system: System, s: int) -> Any:
+    """V^1/2 of a system with s process noises: (s, s)."""
+    V = system.diffusion_cov
+    return jnp.eye(s) if V is None else square_root(jnp.asarray(V, float))
+
+
 def variables(noise: Noisy | Observation, n: int) -> int:
     """Over how many variables an expectation goes: the states, and the noise where it does not enter linearly."""
     return n if noise.linear else n + len(noise.cov)
 
 
 def enters_linearly(function: Callable, n: int, s: int) -> bool:
-    """Whether the second derivatives in w of function(t, x, w) are zero by structure, for x (n,) and w (s,)."""
-    return not curvatures(lambda given, w: function(given[0], given[1:], w), 1 + n, s)
+    """Whether function(t, x, w) is a + G w in w by structure, for x (n,) and w (s,)."""
+    return not is_bent(lambda given, w: function(given[0], given[1:], w), 1 + n, s)
 
 
 def bends(system: System | DiscreteSystem, options: Any) -> str | None:
-    """The name of a function of the system whose second derivatives are not zero by structure; None if it is linear.
+    """The name of a function of the system that is not linear by structure; None if all are.
 
-    Sums and products with constant matrices are zero by structure; what a branch hides may not be.
+    Sums and products with constant matrices are linear by structure; what a branch hides may not be.
     """
     n = system.states
     seen = observation(system, options)
@@ -94,9 +109,15 @@ def bends(system: System | DiscreteSystem, options: Any) -> str | None:
             functions["diffusion"] = (lambda t, x, w: jnp.asarray(diffusion(t, x)) @ w, s)
 
     def bent(f: Callable, s: int) -> bool:
-        return bool(curvatures(lambda given, z: f(given[0], z[:n], z[n:]), 1, n + s))
+        return is_bent(lambda given, z: f(given[0], z[:n], z[n:]), 1, n + s)
 
     return next((name for name, (f, s) in functions.items() if bent(f, s)), None)
+
+
+def is_bent(function: Callable, p: int, n: int) -> bool:
+    """Whether function(given, z) is not linear in z by structure, for given (p,) and z (n,), none of which is known, so
+    that no zero of one time passes for all."""
+    return bool(curvatures(function, p, n)) or breaks(function, p, n)
 
 
 def curvatures(function: Callable, p: int, n: int) -> list[tuple[int, ...]]:

@@ -7,7 +7,8 @@ h_j(k, x, v), all at the estimate and w = v = 0, X the covariance of w and T tha
 `sof` (Athans): c = c' = 0, so the bias that (1) and (2) take out adds nothing to the covariance. `sof-gaussian`: for
 x - m and the noise independent and Gaussian, exact where f and h are quadratic,
   (3) c_ij = tr(F_i P F_j P)/2 + tr(G_i X G_j X)/2 + tr(N_i X N_j' P),  c' likewise of M, Q, R
-In continuous time, with the drift's Hessian f_xx and G(t, x) dw:
+which, with roots P = L L' and X = B B', are outer products of the columns L'F_i L/sqrt 2, B'G_i B/sqrt 2 and L'N_i B.
+In continuous time, with the drift's Hessian f_xx and G(t, x) dw, for `propagation`:
   (4) dm = f + f_xx:P/2,  dP = F P + P F' + G V G' + c
 with c = 0 (`sof`) or c_iq = P_pt V_jl G_ij,p G_ql,t, what (3) becomes for short steps (`sof-gaussian`).
 Cost O(n^4). Fails when the third derivatives matter within a standard deviation.
@@ -15,14 +16,17 @@ Cost O(n^4). Fails when the third derivatives matter within a standard deviation
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
 
-from nlbench.discrete.correction import Gaussian, correct, predicted
-from nlbench.discrete.expansion import First, Second, curvature, drift, first, second
-from nlbench.discrete.problem import spectrum
+from nlbench.discrete.correction import Spread, conditioned, factor, joint
+from nlbench.discrete.expansion import Second, curvature, drift, first, second
+from nlbench.discrete.problem import density_root, noise_columns
+from nlbench.discrete.propagation import Local
+from nlbench.discrete.roots import square_root
 
 if TYPE_CHECKING:
     from nlbench.discrete.problem import Noisy, Observation
@@ -30,44 +34,34 @@ if TYPE_CHECKING:
     from nlbench.systems.system import System
 
 
-def step(whole: bool, motion: Noisy, k: Any, prior: Gaussian) -> Gaussian:
+def step(whole: bool, motion: Noisy, k: Any, prior: Spread) -> Spread:
     """(1); whole: with (3)."""
-    s = len(motion.cov)
+    s, L, B = len(motion.cov), prior.root, square_root(motion.cov)
     f, hessians = first(motion.function, k, prior.mean, s), second(motion.function, k, prior.mean, s)
-    cov = _linear(f, prior.cov, motion.cov)
-    if whole:
-        cov = cov + _quadratic(hessians, prior.cov, motion.cov)
-    return Gaussian(f.value + _bias(hessians, prior.cov, motion.cov), cov)
+    noise = _noise(whole, f.w @ B, hessians, L, B)
+    return Spread(f.value + _bias(hessians, prior.cov, motion.cov), factor(f.x @ L, noise))
 
 
-def slope(whole: bool, system: System, t: Any, prior: Gaussian) -> Gaussian:
+def local(whole: bool, system: System, t: Any, mean: Any, columns: Any) -> Local:
     """(4)."""
-    mean, P = prior
     f, F = drift(system, t, mean)
-    FP = F @ P
-    dP = FP + FP.T + spectrum(system, t, mean)
+    f = f + jnp.einsum("iab,ap,bp->i", curvature(system, t, mean), columns, columns) / 2
+    g = noise_columns(system, t, mean)
     if whole and system.diffusion is not None:
         diffusion = system.diffusion
         Gx = jax.jacfwd(lambda x: jnp.asarray(diffusion(t, x)))(mean)
-        V = jnp.eye(Gx.shape[1]) if system.diffusion_cov is None else jnp.asarray(system.diffusion_cov)
-        dP = dP + jnp.einsum("pt,jl,ijp,qlt->iq", P, V, Gx, Gx)
-    return Gaussian(f + jnp.einsum("iab,ab->i", curvature(system, t, mean), P) / 2, dP)
+        changes = jnp.einsum("ijp,jl,pc->icl", Gx, density_root(system, Gx.shape[1]), columns)
+        g = jnp.concatenate([g, changes.reshape(len(mean), -1)], 1)
+    return Local(f, F, g)
 
 
-def update(whole: bool, seen: Observation, t: Any, prior: Gaussian, y: Any) -> tuple[Gaussian, UpdateInfo]:
+def update(whole: bool, seen: Observation, t: Any, prior: Spread, y: Any) -> tuple[Spread, UpdateInfo]:
     """(2); whole: with (3)."""
-    q = len(seen.cov)
+    q, L, B = len(seen.cov), prior.root, square_root(seen.cov)
     h, hessians = first(seen.function, t, prior.mean, q), second(seen.function, t, prior.mean, q)
     z = seen.innovation(y, h.value + _bias(hessians, prior.cov, seen.cov))
-    S = _linear(h, prior.cov, seen.cov)
-    if whole:
-        S = S + _quadratic(hessians, prior.cov, seen.cov)
-    return correct(prior, predicted(seen, y, z, S, prior.cov @ h.x.T), seen.limiter)
-
-
-def _linear(f: First, P: Any, X: Any) -> Any:
-    """A P A' + L X L'."""
-    return f.x @ P @ f.x.T + f.w @ X @ f.w.T
+    noise = _noise(whole, h.w @ B, hessians, L, B)
+    return conditioned(prior, joint(seen, y, z, noise, h.x @ L, L), seen.limiter)
 
 
 def _bias(hessians: Second, P: Any, X: Any) -> Any:
@@ -75,8 +69,12 @@ def _bias(hessians: Second, P: Any, X: Any) -> Any:
     return (jnp.einsum("iab,ab->i", hessians.xx, P) + jnp.einsum("ipq,pq->i", hessians.ww, X)) / 2
 
 
-def _quadratic(hessians: Second, P: Any, X: Any) -> Any:
-    """(3)."""
-    FP, GX = hessians.xx @ P, hessians.ww @ X
-    cross = jnp.einsum("iap,pq,jbq,ab->ij", hessians.xw, X, hessians.xw, P)
-    return jnp.einsum("iab,jba->ij", FP, FP) / 2 + jnp.einsum("ipq,jqp->ij", GX, GX) / 2 + cross
+def _noise(whole: bool, linear: Any, hessians: Second, L: Any, B: Any) -> Any:
+    """The columns that are independent of x - m: those of the noise, and with `whole` those of (3)."""
+    if not whole:
+        return linear
+    squares = [
+        jnp.einsum("iab,aj,bk->ijk", H, X, X) / math.sqrt(2) for H, X in ((hessians.xx, L), (hessians.ww, B))
+    ]
+    cross = jnp.einsum("iap,aj,pk->ijk", hessians.xw, L, B)
+    return jnp.concatenate([linear, *(each.reshape(len(linear), -1) for each in (*squares, cross))], 1)

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from nlbench.discrete import gaussian
-from nlbench.discrete.second_order import slope, step, update
+from nlbench.discrete.second_order import local, step, update
 
 if TYPE_CHECKING:
     from nlbench.filters.filter import Filter
@@ -19,5 +19,5 @@ def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) ->
     """`sof` or `sof-gaussian`."""
     whole = name == "sof-gaussian"
     return gaussian.build(
-        name, system, options, partial(step, whole), partial(slope, whole), partial(update, whole)
+        name, system, options, partial(step, whole), partial(local, whole), partial(update, whole)
     )

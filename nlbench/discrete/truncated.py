@@ -25,7 +25,7 @@ import jax
 import jax.numpy as jnp
 
 from nlbench.discrete import gaussian
-from nlbench.discrete.correction import Gaussian, correct, limited, predicted, symmetric
+from nlbench.discrete.correction import Gaussian, correct, gains, limited, predicted, symmetric
 from nlbench.discrete.expansion import curvature, drift, first, second
 from nlbench.discrete.problem import spectrum
 
@@ -41,7 +41,7 @@ def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) ->
     """`truncated`, `truncated-jazwinski` or `modified-jazwinski`."""
     erroneous = name != "truncated"
     forced = name == "truncated-jazwinski"
-    return gaussian.build(
+    return gaussian.build_with_covariance(
         name, system, options, partial(step, erroneous), slope, partial(update, erroneous, forced)
     )
 
@@ -103,5 +103,6 @@ def update(
     if not forced:
         return posterior, info
     # An entry that was not taken has z = 0, and so does its element of S^-1 z.
-    pull = b @ jnp.linalg.solve(foretold.S, limited(foretold, seen.limiter))
+    z, _, b = gains(foretold._replace(C=b[None]), limited(foretold, seen.limiter))
+    pull = (b.T @ z)[0]
     return posterior._replace(cov=posterior.cov - prior.cov * pull / 2), info  # (3)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, Field, PositiveFloat, PositiveInt
+from pydantic import BaseModel, Field, PositiveFloat, PositiveInt, model_validator
 
 from nlbench import plugins
 from nlbench.continuous.catalogue import ROWS as CONTINUOUS
 from nlbench.continuous.catalogue import SHARED as ALSO_CONTINUOUS
 from nlbench.discrete.catalogue import ROWS as DISCRETE
 from nlbench.discrete.catalogue import Options as SampledOptions
+from nlbench.discrete.catalogue import Propagation
 from nlbench.row import Row, StrictOptions
 from nlbench.solvers import Solver, Tolerances
 
@@ -39,6 +40,22 @@ class Options(StrictOptions):
         default=None, description="integration step; default: the experiment's"
     )
     missing: bool = Field(default=True, description="whether measurements may be NaN, meaning not taken")
+
+
+class LinearisedOptions(Options):
+    """Options of the linearised filter."""
+
+    propagation: Propagation = Field(
+        default="moments",
+        description="integrate the moment equations, or carry the covariance through the transition of each step, "
+        "which keeps small variances right beside large ones",
+    )
+
+    @model_validator(mode="after")
+    def _fit(self) -> LinearisedOptions:
+        if self.propagation == "transition" and self.integrator != Integrator():
+            raise ValueError("propagation: transition makes steps of rk4: leave integrator out, or take moments")
+        return self
 
 
 class CurvedOptions(Options):
@@ -89,9 +106,9 @@ class GuardedOptions(Options):
 CULVER = "Culver 1969"
 MOMENT = {
     "linearised-kalman": Row(
-        "Kalman filter linearised at its own estimate", f"{CULVER}, 4.71-4.72", 1, "kalman", Options
+        "Kalman filter linearised at its own estimate", f"{CULVER}, 4.71-4.72", 1, "kalman", LinearisedOptions
     ),
-    "ekf": Row("another name of linearised-kalman", f"{CULVER}, 4.71-4.72", 1, "kalman", Options),
+    "ekf": Row("another name of linearised-kalman", f"{CULVER}, 4.71-4.72", 1, "kalman", LinearisedOptions),
     "second-order": Row(
         "second-order moment equations, Kalman update", f"{CULVER}, 5.66", 2, "kalman", Options
     ),

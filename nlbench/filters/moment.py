@@ -15,7 +15,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from nlbench.algebra import Tensor, shared, zeros
+from nlbench.algebra import shared, zeros
+from nlbench.checks import refuse_exact
+from nlbench.discrete.linearised import local
+from nlbench.discrete.propagation import carried
 from nlbench.errors import ConfigError
 from nlbench.filters.filter import Filter, UpdateInfo, central_angle
 from nlbench.moments import integrate as integration
@@ -27,7 +30,7 @@ from nlbench.updates.hermite3 import hermite3, sub1, sub2
 from nlbench.updates.hermite4 import hermite4
 from nlbench.updates.kalman import kalman
 from nlbench.updates.limiter import limited
-from nlbench.updates.measurement import gain, linearise
+from nlbench.updates.measurement import Gain, Measurement, gain, linearise
 from nlbench.updates.nonlinear import Outcome, Seen, see
 from nlbench.updates.posterior import Posterior
 from nlbench.updates.quadrature import direct, quadrature
@@ -67,8 +70,11 @@ CURVED: dict[str, Callable[[Any], Callable[[Components, Seen], Outcome]]] = {
 def build(name: str, row: Row, system: System, options: Options) -> Filter:
     """The filter of a catalogue row, bound to a system measured at discrete times.
 
-    Raises `ConfigError` where an update would integrate over too many nodes.
+    Raises `ConfigError` where an update would integrate over too many nodes, or divide by the noise of a measurement
+    that has none.
     """
+    if row.update in CURVED:
+        refuse_exact(name, system.measurement_cov)
     points = getattr(options, "points", 1)
     if points**system.states > MOST_NODES:
         raise ConfigError(
@@ -77,8 +83,18 @@ def build(name: str, row: Row, system: System, options: Options) -> Filter:
     integrator = integration.build(**options.integrator.model_dump())
     updated = _curved_update if row.update in CURVED else _linear_update
 
-    def integrate(state: Components, t: Any, h: Any, count: Any) -> Components:
+    def by_moments(state: Components, t: Any, h: Any, count: Any) -> Components:
         return integrator.integrate(lambda t, y: dense(rates(system, row.order, t, y)), t, h, count, state)
+
+    def by_transition(state: Components, t: Any, h: Any, count: Any) -> Components:
+        def step(i: Any, state: Components) -> Components:
+            mean, P, *_ = to_full(state)
+            mean, Phi, noise = carried(partial(local, system), t + i * h, h, mean, jnp.eye(system.states))
+            return to_components(Moments(mean, Phi @ P @ Phi.T + noise @ noise.T), row.order)
+
+        return jax.lax.fori_loop(0, count, step, state)
+
+    integrate = by_transition if getattr(options, "propagation", "moments") == "transition" else by_moments
 
     def predict(state: Components, t0: Any, t1: Any, key: Any = None) -> Components:
         h, count = integration.steps_between(t0, t1, options.step or system.default_step)
@@ -119,10 +135,12 @@ def _linear_update(
     made = shared(partial(_updated, system, row, options, t), t, state, y, reused=True)
     # Where the guard fires the predictive density is Gaussian.
     density_ratio = jnp.where(made.fired, 0.0, made.nu)
+    seen, gained = made.measurement, made.gain
+    density = gaussian_log_density(gained.turned(seen.z), gained, seen.taken, seen.slack)
     info = UpdateInfo(
-        innovation=made.z.to_array(),
-        innovation_cov=made.S_z.to_array(),
-        log_likelihood=gaussian_log_density(made.z, made.W, made.S_z, made.taken) + jnp.log1p(density_ratio),
+        innovation=seen.z.to_array(),
+        innovation_cov=gained.S.to_array(),
+        log_likelihood=density + jnp.log1p(density_ratio),
         nu=jnp.asarray(made.nu, float),
         guarded=made.fired,
     )
@@ -135,10 +153,8 @@ class Updated(NamedTuple):
     moments: Components
     fired: Any
     nu: Any
-    z: Tensor
-    S_z: Tensor
-    W: Tensor
-    taken: Any
+    measurement: Measurement
+    gain: Gain
 
 
 def _updated(system: System, row: Row, options: Options, t: Any, state: Components, y: Any) -> Updated:
@@ -146,8 +162,9 @@ def _updated(system: System, row: Row, options: Options, t: Any, state: Componen
     gained = gain(state.cov, measurement)
     z = clipped = measurement.z
     if options.limiter is not None:
-        clipped = limited(z, gained.S_z, options.limiter)
+        clipped = limited(z, gained.S, options.limiter)
         z = clipped if options.limiter_scope == "all" else z
+    z, clipped = gained.turned(z), gained.turned(clipped)
     posterior = UPDATES[row.update](state, gained, z, clipped)
     moments, fired = posterior.moments, jnp.zeros((), bool)
     if options.guard == "sub1" and row.update != "kalman":
@@ -155,9 +172,7 @@ def _updated(system: System, row: Row, options: Options, t: Any, state: Componen
         moments, fired = guarded(posterior, fallback(prior, gained, z))
     if row.order == 4 and moments.fourth is None:
         moments = moments._replace(fourth=zeros(system.states, 4))
-    return Updated(
-        dense(moments), fired, posterior.nu, measurement.z, gained.S_z, gained.W, measurement.taken
-    )
+    return Updated(dense(moments), fired, posterior.nu, measurement, gained)
 
 
 def _curved_update(
@@ -166,7 +181,7 @@ def _curved_update(
     """An update of `CURVED`."""
     measurement = linearise(system, t, state, y, options.missing)
     gained = gain(state.cov, measurement)
-    clipped = None if options.limiter is None else limited(measurement.z, gained.S_z, options.limiter)
+    clipped = None if options.limiter is None else limited(measurement.z, gained.S, options.limiter)
     seen = see(system, t, state, y, measurement, gained, clipped)
     moments, nu, log_likelihood = CURVED[row.update](options)(state, seen)
     fired = jnp.zeros((), bool)
@@ -177,7 +192,7 @@ def _curved_update(
             else fallback(state, gained, seen.z)
         )
         moments, fired = guarded(Posterior(moments, nu), safe)
-        gaussian = gaussian_log_density(seen.z, gained.W, gained.S_z, seen.taken)
+        gaussian = gaussian_log_density(seen.z, gained, seen.taken, seen.slack)
         log_likelihood = jnp.where(fired, gaussian, log_likelihood)
     moments = dense(moments)
     if options.missing:  # nothing taken: the prior, to the last bit
@@ -186,7 +201,7 @@ def _curved_update(
         log_likelihood = jnp.where(some, log_likelihood, 0.0)
     info = UpdateInfo(
         innovation=measurement.z.to_array(),
-        innovation_cov=gained.S_z.to_array(),
+        innovation_cov=gained.S.to_array(),
         log_likelihood=log_likelihood,
         nu=jnp.asarray(nu, float),
         guarded=fired,

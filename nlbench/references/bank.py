@@ -9,18 +9,18 @@ The posterior of (x, z), z the constant, is a mixture; with d_p = (m_p, z_p) - m
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from nlbench.algebra import Tensor, einsum, log_determinant
+from nlbench.algebra import Tensor
 from nlbench.filters.filter import UpdateInfo
 from nlbench.moments.closures import fourth_coefficient
 from nlbench.moments.moments import Components, dense
 from nlbench.references.sums import total as sum_over_nodes
+from nlbench.updates.density import gaussian_log_density
 from nlbench.updates.kalman import kalman
 from nlbench.updates.measurement import gain
 
@@ -67,10 +67,11 @@ class Updated(NamedTuple):
 def _updated(measurement: Measurement, prior: Components) -> Updated:
     """The Kalman update of one node's filter."""
     gained = gain(prior.cov, measurement)
-    z = measurement.z
-    distance = einsum("r,r->", einsum("rs,s->r", gained.W, z), z)[()]
-    level = distance + log_determinant(gained.S_z) + measurement.taken * math.log(2 * math.pi)
-    return Updated(dense(kalman(prior, gained, z, z).moments), -0.5 * level, z.dense(), gained.S_z.dense())
+    z = gained.turned(measurement.z)
+    density = gaussian_log_density(z, gained, measurement.taken, measurement.slack)
+    return Updated(
+        dense(kalman(prior, gained, z, z).moments), density, measurement.z.dense(), gained.S.dense()
+    )
 
 
 def _normalised(log_weights: Any) -> Any:

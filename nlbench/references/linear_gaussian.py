@@ -1,6 +1,6 @@
 """The exact posterior of a linear system with Gaussian noise and prior: the Kalman filter's.
 
-In continuous time it is exact but for the integration of its moments, by RK4 over the system's steps.
+In continuous time it is exact but for the transition of each step, which is that of RK4.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nlbench.discrete import gaussian, linearised
-from nlbench.discrete.catalogue import GaussianOptions
+from nlbench.discrete.catalogue import PropagatedOptions
 from nlbench.discrete.problem import bends
 from nlbench.errors import ConfigError
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 def build(system: System | DiscreteSystem) -> Filter:
     """The Kalman filter. Raises `ConfigError` where the system is not linear."""
-    options = GaussianOptions()
+    options = PropagatedOptions()
     bent = bends(system, options)
     if bent:
         raise ConfigError(f"exact: {bent} is not linear, or cannot be told to be")
-    return gaussian.build("exact", system, options, linearised.step, linearised.slope, linearised.update)
+    return gaussian.build("exact", system, options, linearised.step, linearised.local, linearised.update)

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from nlbench.algebra import Tensor, einsum, expand
-from nlbench.discrete.problem import curvatures, stacked
+from nlbench.discrete.problem import is_bent, stacked
 from nlbench.discrete.time import Clock
 from nlbench.errors import ConfigError
 from nlbench.filters.filter import Filter, UpdateInfo
@@ -116,7 +116,7 @@ def _refuse(system: DiscreteSystem) -> None:
         "transition": (lambda given, z: _next(system, given[0], jnp.append(z[:n], given[1]), z[n:])[:n], s),
         "observe": (lambda given, z: _observed(system, given[0], jnp.append(z[:n], given[1]), z[n:]), q),
     }
-    bent = [name for name, (function, noises) in functions.items() if curvatures(function, 2, n + noises)]
+    bent = [name for name, (function, noises) in functions.items() if is_bent(function, 2, n + noises)]
     if bent:
         raise ConfigError(f"exact: {bent[0]} is not linear once the last state is known")
     x, w = jnp.asarray(system.initial.mean, float), jnp.zeros(s)

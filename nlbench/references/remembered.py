@@ -8,18 +8,18 @@ cloud of points for each measurement.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from nlbench.algebra import Tensor, log_determinant, squared_distance
+from nlbench.algebra import Tensor
 from nlbench.filters.filter import Filter, UpdateInfo, central_angle
 from nlbench.moments import integrate as integration
 from nlbench.moments.equations import rates
 from nlbench.moments.moments import Components, Moments, dense, to_components, to_full
 from nlbench.references.initial_posterior import posterior_track
+from nlbench.updates.density import gaussian_log_density
 from nlbench.updates.kalman import kalman
 from nlbench.updates.measurement import gain, linearise
 
@@ -69,7 +69,9 @@ def build(system: System, record: InitialPosterior) -> Filter:
         number = state.made if sighting is None else sighting
         seen = companion.sighted(number) if companion.sightings else companion
         measurement = linearise(seen, t, state.companion, y, missing=True)
-        after = kalman(state.companion, gain(state.companion.cov, measurement), measurement.z, measurement.z)
+        gained = gain(state.companion.cov, measurement)
+        z = gained.turned(measurement.z)
+        after = kalman(state.companion, gained, z, z)
         remembered = State(
             state.t,
             state.made + 1,
@@ -143,11 +145,12 @@ def _info(system: System, prior: Components, state: State, y: Any) -> UpdateInfo
     seen = system.sighted(state.made) if system.sightings else system
     measurement = linearise(seen, state.t, prior, y, missing=True)
     gained = gain(prior.cov, measurement)
-    level = squared_distance(gained.S_z, measurement.z) + log_determinant(gained.S_z)
     return UpdateInfo(
         innovation=measurement.z.to_array(),
-        innovation_cov=gained.S_z.to_array(),
-        log_likelihood=-0.5 * (level + measurement.taken * math.log(2 * math.pi)),
+        innovation_cov=gained.S.to_array(),
+        log_likelihood=gaussian_log_density(
+            gained.turned(measurement.z), gained, measurement.taken, measurement.slack
+        ),
         nu=jnp.zeros(()),
         guarded=jnp.zeros((), bool),
     )

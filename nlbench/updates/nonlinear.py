@@ -20,10 +20,11 @@ if TYPE_CHECKING:
 
 
 class Seen(NamedTuple):
-    """A measurement at the prior mean m, with entries that are missing taken out.
+    """A measurement at the prior mean m, with entries that are missing taken out, the others in turn (`Gain`): all of
+    it is of T y instead of y.
 
     z: (m,), y - h(m), limited where a limiter is on. R: (m, m). gain: that of the linearised measurement.
-    taken: the number of entries taken.
+    taken: the number of entries taken. slack: as of `Measurement`.
     curvature: () -> M (m, n, n), half the Hessians of h at m.
     residual: x (n,) -> (m,), y - h(x), shifted as the limiter shifted z, zero where missing.
     """
@@ -34,6 +35,7 @@ class Seen(NamedTuple):
     taken: Any
     curvature: Callable[[], Tensor]
     residual: Callable[[Any], Any]
+    slack: Tensor | None
 
 
 class Outcome(NamedTuple):
@@ -63,16 +65,18 @@ def see(
         h = system.observe(t, x)
         h = jnp.stack([jnp.asarray(part) for part in h]) if isinstance(h, (tuple, list)) else jnp.asarray(h)
         z = jnp.where(there, jnp.asarray(system.innovation(filled, h)), 0.0)
-        return z if clipped is None else z - (measurement.z - clipped).to_array()
+        z = z if clipped is None else z - (measurement.z - clipped).to_array()
+        return z if len(z) == 1 else gain.T.to_array() @ z
 
     def curvature() -> Tensor:
         M = expand(system.observe, t, list(prior.mean), 2).second
         assert M is not None
         masked = {index: jnp.where(there[index[0]], entry, 0.0) for index, entry in M.entries.items()}
-        return Tensor(M.shape, M.symmetry, masked)
+        M = Tensor(M.shape, M.symmetry, masked)
+        return M if M.shape[0] == 1 else einsum("rs,sab->rab", gain.T, M)
 
-    z = measurement.z if clipped is None else clipped
-    return Seen(z, measurement.R, gain, measurement.taken, curvature, residual)
+    z = gain.turned(measurement.z if clipped is None else clipped)
+    return Seen(z, gain.R, gain, measurement.taken, curvature, residual, measurement.slack)
 
 
 def weighted(H: Tensor, W: Tensor, z: Tensor) -> Tensor:

@@ -38,7 +38,7 @@ def series(prior: Components, seen: Seen, equations: str = "corrected") -> Outco
     zeta, L = weighted(gain.H, noise, z), einsum("ra,rs,sb->ab", gain.H, noise, gain.H)
     d, omega = einsum("ir,r->i", gain.K, z), gain.omega
     theta = 0.5 * einsum("rs,r,s->", noise - gain.W, z, z)[()]  # (1)
-    inverse_g = jnp.exp(0.5 * (log_determinant(gain.S_z) - log_determinant(seen.R)) - theta)
+    inverse_g = jnp.exp(0.5 * (log_determinant(gain.variance) - log_determinant(seen.R)) - theta)
     E = {
         order: _contractions(tensor, zeta, L)
         for order, tensor in _coefficients(prior, printed=equations == "printed").items()
@@ -64,7 +64,7 @@ def series(prior: Components, seen: Seen, equations: str = "corrected") -> Outco
         raw = kappa * (raw + einsum("i,j,k,l->ijkl", d, d, d, d) + A(4))
         fourth = raw - placements(4, "i,jkl->ijkl", eps, third) - placements(6, "i,j,kl->ijkl", eps, eps, cov)
         fourth = fourth - einsum("i,j,k,l->ijkl", eps, eps, eps, eps) - gaussian_fourth(cov)
-    density = gaussian_log_density(z, gain.W, gain.S_z, seen.taken) + jnp.log1p(nu)
+    density = gaussian_log_density(z, gain, seen.taken, seen.slack) + jnp.log1p(nu)
     return Outcome(Components(mean, cov, third, fourth), nu, density)
 
 

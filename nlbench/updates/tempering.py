@@ -43,7 +43,7 @@ def tempering(
 
     moments, gained = pseudo_time.integrated(rate, prior, steps)
     log_density = gained - 0.5 * (log_determinant(seen.R) + seen.taken * jnp.log(2 * jnp.pi))
-    nu = jnp.expm1(log_density - gaussian_log_density(seen.z, seen.gain.W, seen.gain.S_z, seen.taken))
+    nu = jnp.expm1(log_density - gaussian_log_density(seen.z, seen.gain, seen.taken, seen.slack))
     return Outcome(moments, nu, log_density)
 
 

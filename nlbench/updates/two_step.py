@@ -43,7 +43,7 @@ def two_step(
 
     moments, gained = pseudo_time.integrated(rate, straight.moments, steps)
     density = (
-        gaussian_log_density(seen.z, seen.gain.W, seen.gain.S_z, seen.taken) + jnp.log1p(straight.nu) + gained
+        gaussian_log_density(seen.z, seen.gain, seen.taken, seen.slack) + jnp.log1p(straight.nu) + gained
     )
     return Outcome(moments, straight.nu, density)
 

@@ -43,11 +43,11 @@ SYSTEMS = {"walk": walk}
 """
 FILTER = """
 from nlbench.discrete import gaussian, linearised
-from nlbench.discrete.catalogue import GaussianOptions
+from nlbench.discrete.catalogue import PropagatedOptions
 
-def mine(system, options: GaussianOptions):
+def mine(system, options: PropagatedOptions):
     "Mine."
-    return gaussian.build("mine", system, options, linearised.step, linearised.slope, linearised.update)
+    return gaussian.build("mine", system, options, linearised.step, linearised.local, linearised.update)
 
 FILTERS = {"mine": mine}
 """
@@ -249,8 +249,8 @@ def test_names_can_move_from_file_to_file():
 )
 def test_a_plain_model_refuses_what_all_options_refuse(entry, message):
     Path("mine.py").write_text(
-        FILTER.replace("from nlbench.discrete.catalogue import GaussianOptions", "import pydantic").replace(
-            "def mine(system, options: GaussianOptions)",
+        FILTER.replace("from nlbench.discrete.catalogue import PropagatedOptions", "import pydantic").replace(
+            "def mine(system, options: PropagatedOptions)",
             "class Options(pydantic.BaseModel):\n    fading: float = 1.0\n    limiter: float | None = None\n\n"
             "def mine(system, options: Options)",
         )
