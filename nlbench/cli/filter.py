@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nlbench.cli import options, output, recording
-from nlbench.errors import LimitError
+from nlbench.errors import LimitError, Problems
+from nlbench.results.reasons import left_out
 
 if TYPE_CHECKING:
     from nlbench.config import Experiment
@@ -50,18 +51,26 @@ def filter_recorded(
 
     System, parameters, initial moments and filters are those of CONFIG. DATA has a column of times (step numbers where
     time is discrete) and one for each measurement; empty or NaN: not measured. The estimates come out as CSV, a summary
-    on stderr.
+    on stderr, and a warning where the first row lies far after the start.
     """
     names = None if measured is None else [name.strip() for name in measured.split(",")]
-    experiment, recorded = recording.read(config, seed, settings, data, time, names)
-    chosen = recording.chosen(experiment, labels)
-    recording.check_start(experiment, recorded, start, time)
-    recording.check_out(out, config, data)
+    problems = Problems()
+    with problems.of(""):
+        recording.check_out(out, config, data)
+    with problems.of(""):
+        experiment, recorded = recording.read(config, seed, settings, data, time, names)
+        with problems.of(""):
+            chosen = recording.chosen(experiment, labels)
+        with problems.of(""):
+            recording.check_start(experiment, recorded, start, time)
+    problems.refuse()
     found = _filtered(experiment, chosen, recorded, start)
     frame = _joined(found)
     facts = _facts(experiment, recorded, found, out)
+    if facts["warning"] and not json:
+        output.complain(f"warning: {facts['warning']}")
     lost = [
-        f"FAILED: {each['filter']}: no finite estimate from {data}:{each['lost_line']} on"
+        f"FAILED: {each['filter']}: no finite estimate from {data}:{each['lost_line']} on; first {each['reason']}"
         for each in facts["filters"]
         if each["lost_line"] is not None
     ]
@@ -128,6 +137,7 @@ def _facts(experiment: Experiment, recorded: Recording, found: list[Any], out: P
         "data": recorded.file,
         "rows": len(recorded.times),
         "missing": sum(math.isnan(value) for value in recorded.values),
+        "warning": f"{recorded.file}: {found[0].doubt}" if found[0].doubt else None,
         "out": None if out is None else str(out),
         "filters": filters,
     }
@@ -143,9 +153,10 @@ def _show(facts: dict[str, Any]) -> None:
         table.append([each["filter"], f"{each['log_likelihood']:.2f}", *numbers, each["verdict"]])
     output.rows(table)
     for each in facts["filters"]:
-        if each["altered"]:
-            share = f"{each['altered']:,} of {each['altered'] + each['samples']:,} updates"
-            print(f"\n{each['filter']}: {share} were limited or guarded, so its NIS has no bounds")
+        counts = {"limited_or_guarded": each["altered"], "invalid": each["invalid"]}
+        if sum(counts.values()):
+            of = f"of {sum(counts.values()) + each['samples']:,} updates"
+            print(f"\n{each['filter']}: {left_out(counts)} {of}, so its NIS has no bounds")
         if each["lost_line"] is None and not math.isfinite(each["log_likelihood"]):
             print(f"\n{each['filter']}: its density was not positive at some measurement")
     if facts["out"]:

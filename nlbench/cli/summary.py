@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Container
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from nlbench.cli import output
 from nlbench.errors import GateError, LimitError, NlbenchError, printable
+from nlbench.results.reasons import failed as labels_failed
+from nlbench.results.reasons import left_out, rms_rows, told
 
 if TYPE_CHECKING:
     from nlbench.config import Experiment
@@ -18,9 +21,6 @@ VERDICT_STYLES = {"confirmed": "green", "refuted": "red"}
 
 def facts(experiment: Experiment, results: Any, report: Path) -> dict[str, Any]:
     """What `--json` prints, and what the other functions here read."""
-    statistics = results.table("statistics")
-    rms = statistics[(statistics["statistic"] == "rms") & ~statistics["time"].astype(str).eq("all")]
-    near = rms["time"].astype(float).round(9).isin([round(time, 9) for time in experiment.report_times])
     folder = Path(results.path)
     return {
         "experiment": experiment.experiment,
@@ -30,8 +30,13 @@ def facts(experiment: Experiment, results: Any, report: Path) -> dict[str, Any]:
         "folder": str(folder),
         "report": str(report),
         "figures": sorted(str(each) for each in (folder / "figures").glob("*")),
-        "rms": _records(rms[near]),
+        "rms": rms_rows(results.table("statistics"), experiment.report_times),
         "divergence": _records(results.table("divergence")),
+        **{
+            name: _records(results.table(name))
+            for name in ("failures", "left_out")
+            if (folder / "tables" / f"{name}.csv").exists()
+        },
         "claims": _records(results.table("claims")) if experiment.claims else [],
     }
 
@@ -44,21 +49,20 @@ def precision(asked: Precision, chosen: Any, experiment: Experiment, results: An
     return {"asked": str(asked), **chosen._asdict(), "reached": share}
 
 
-def failed(facts: dict[str, Any]) -> list[str]:
-    """Labels of filters without a single usable number: every run diverged, or every rms is NaN."""
-    labels = []
-    for row in facts["divergence"]:
-        values = [each["value"] for each in facts["rms"] if each["filter"] == row["filter"]]
-        if row["diverged"] >= row["n"] or (values and all(math.isnan(value) for value in values)):
-            labels.append(row["filter"])
-    return labels
+def failed(facts: dict[str, Any]) -> dict[str, str]:
+    """Find the filters without a single usable number, each with when and in what it first went wrong, if known."""
+    reasons = {row["filter"]: told(row) for row in facts.get("failures", [])}
+    return {label: reasons.get(label, "") for label in labels_failed(facts["divergence"], facts["rms"])}
 
 
 def faults(experiment: Experiment, facts: dict[str, Any], gate: bool) -> list[NlbenchError]:
     """What makes the command fail, the gravest first."""
     found: list[NlbenchError] = []
     lost, limit = failed(facts), experiment.limits.diverged
-    found += [LimitError(f"FAILED: {label}: no run gave a usable estimate") for label in lost]
+    found += [
+        LimitError(f"FAILED: {label}: no run gave a usable estimate{reason and f'; {reason}'}")
+        for label, reason in lost.items()
+    ]
     for row in facts["divergence"]:
         if row["filter"] not in lost and row["diverged"] / row["n"] > limit:
             share = f"{output.percent(row['diverged'] / row['n'])} % of the runs"
@@ -87,6 +91,14 @@ def show(experiment: Experiment, facts: dict[str, Any]) -> None:
     output.rows(
         [row["filter"], _diverged(row), _failed(row["filter"] in lost)] for row in facts["divergence"]
     )
+    notes = [f"{label}: {reason}" for label, reason in lost.items() if reason]
+    notes += [
+        f"{row['filter']}: left out of NIS: {left_out(row)}"
+        for row in facts.get("left_out", [])
+        if row["time"] == "all" and row["invalid"]
+    ]
+    for note in notes:
+        print(fill(note, output.WIDTH, initial_indent="  ", subsequent_indent="    "))
     if facts["claims"]:
         print("\nclaims")
         says = {each.id: each.says for each in experiment.claims}
@@ -106,7 +118,7 @@ def _reached(found: dict[str, Any]) -> str:
     return f"asked {found['asked']}, reached {output.percent(found['reached'])} % at worst{left_out}"
 
 
-def _rms(experiment: Experiment, rows: list[dict[str, Any]], coordinate: str, lost: list[str]) -> None:
+def _rms(experiment: Experiment, rows: list[dict[str, Any]], coordinate: str, lost: Container[str]) -> None:
     label_width = max(len(label) for label in experiment.labels)
     columns = max(1, (output.WIDTH - label_width - 2) // 13)
     times = sorted({float(row["time"]) for row in rows})

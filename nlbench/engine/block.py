@@ -10,7 +10,7 @@ import numpy as np
 from jax.extend.core import jaxpr_as_fun
 
 from nlbench.engine.follow import Followed, follow, over_lanes
-from nlbench.engine.judge import judge
+from nlbench.engine.judge import judge, most_stated
 from nlbench.engine.sighting import follow_sightings
 from nlbench.simulate import Simulated, Trajectory, seed_key, simulate
 from nlbench.statistics.accumulate import block_sums
@@ -112,7 +112,7 @@ def block_tracks(
     scored = problem.layout.scores and bool(problem.schedule.sightings or problem.schedule.measurements)
     moments = [followed(problem, runner, data, scored) for runner in problem.runners]
     judged = [
-        judge(problem.judged_by, runner.filter.system, layout, states, each.components)
+        judge(problem.judged_by, runner.filter.system, layout, states, each.components, each.senseless)
         for runner, each in zip(problem.runners, moments, strict=True)
     ]
     reports = np.asarray(layout.reports)
@@ -151,6 +151,7 @@ def trajectories(problem: Problem, seed: tuple[Any, Any], lanes: Trajectory) -> 
 
 def followed(problem: Problem, runner: Runner, data: Simulated, scores: bool = False) -> Followed:
     """One filter along the data of a block, scored by its measurements if that is asked for."""
+    most = most_stated(problem.layout, runner)
     if problem.schedule.sightings:
-        return follow_sightings(problem, runner, data, scores)
-    return follow(runner, problem.schedule, data.measurements, problem.block, data.key, scores)
+        return follow_sightings(problem, runner, data, scores, most)
+    return follow(runner, problem.schedule, data.measurements, problem.block, data.key, scores, most)

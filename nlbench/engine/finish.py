@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING
 
 from nlbench.engine.compiled import Compiled
 from nlbench.engine.cost import cost_table
+from nlbench.engine.failure import failures
 from nlbench.engine.resume import device, numerics
 from nlbench.engine.trace import trace_tables
 from nlbench.errors import Interrupted
 from nlbench.results.atomic import remove
 from nlbench.results.folder import TABLES, RunFolder
 from nlbench.results.manifest import commit, versions
+from nlbench.results.reasons import failed, rms_rows
 from nlbench.results.results import Results
 from nlbench.statistics.claims import judged
-from nlbench.statistics.consistency import consistency_table
+from nlbench.statistics.consistency import consistency_table, left_out_table
 from nlbench.statistics.sets import KeptTable
 from nlbench.statistics.summary import tables
 from nlbench.statistics.totals import Totals
@@ -79,7 +81,8 @@ def of_totals(problem: Problem, totals: Totals) -> dict[str, pd.DataFrame]:
     """The tables that follow from the totals alone."""
     made = tables(totals)
     made["consistency"] = consistency_table(totals, made["statistics"], problem.truth.measurements)
-    return made
+    left_out = left_out_table(totals)
+    return made | ({"left_out": left_out} if len(left_out) else {})
 
 
 def _go_on(stopped: Callable[[], bool]) -> None:
@@ -111,6 +114,10 @@ def write(
     clip = dict(zip(layout.magnitudes, layout.magnitude_clip, strict=True))
     norms = {name: [layout.coordinates[i] for i in members] for name, members in layout.norms.items()}
     made |= _judged(experiment, made, clip, norms)
+    rms = rms_rows(made["statistics"], experiment.report_times)
+    if lost := failed(made["divergence"].to_dict(orient="records"), rms):
+        _go_on(stopped)
+        made["failures"] = failures(problem, experiment.monte_carlo.seed, totals.runs, lost)
     if experiment.traces:
         _go_on(stopped)
         made |= trace_tables(compiled, experiment.traces, threads)
@@ -118,7 +125,7 @@ def write(
         _go_on(stopped)
         made["cost"] = cost_table(problem, experiment.monte_carlo.seed, threads)
     _go_on(stopped)
-    _remove(folder, "traces", "responses", "claims", "sets", "cost")
+    _remove(folder, "traces", "responses", "claims", "sets", "cost", "left_out", "failures")
     folder.write_tables(made)
     folder.finish(
         totals.runs,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
@@ -18,27 +19,39 @@ if TYPE_CHECKING:
 
 class Followed(NamedTuple):
     """Unique components of mean, covariance and third moment in one axis, (T, k, L), the start first; how many updates
-    the guard replaced, (L,); how many there were, (L,); and the scores (T, L), if they were asked for."""
+    the guard replaced, (L,); how many there were, (L,); whether what the filter stated before any update so far was
+    beyond all sense, (T, L); and the scores (T, L), if they were asked for."""
 
     components: Any
     guarded: Any
     updates: Any
+    senseless: Any = False
     scores: Scores | None = None
 
 
 class Carried(NamedTuple):
-    """Of a block: the filter's state; in how many updates the guard replaced it, (L,); the scores since the last
-    output, (L,), if they were asked for."""
+    """Of a block: the filter's state; in how many updates the guard replaced it, (L,); whether it was beyond all sense
+    before one, (L,); the scores since the last output, (L,), if they were asked for."""
 
     state: Any
     guarded: Any
+    senseless: Any
     scores: Scores | None
 
 
 def follow(
-    runner: Runner, schedule: Schedule, measurements: Any, lanes: int, keys: Any = None, scores: bool = False
+    runner: Runner,
+    schedule: Schedule,
+    measurements: Any,
+    lanes: int,
+    keys: Any = None,
+    scores: bool = False,
+    most: Any = None,
 ) -> Followed:
-    """The filter along the measurements (M, m, L) of a block. keys: (2, L), for a filter that draws random numbers."""
+    """The filter along the measurements (M, m, L) of a block. keys: (2, L), for a filter that draws random numbers.
+
+    most: (n,), the deviations beyond which what it states makes no sense; None where that is not looked at.
+    """
     filter = runner.filter
     start = begun(runner, lanes, keys)
     span = runner.step * runner.steps
@@ -59,12 +72,12 @@ def follow(
 
     def measure(number: Any, carried: Carried) -> Carried:
         y = measurements[(number + 1) // schedule.measured_every - 1]
-        return updated(filter, carried, (number + 1) * span, y)
+        return updated(filter, carried, (number + 1) * span, y, most)
 
     def held(number: Any, carried: Carried) -> Carried:
         """A step under the measurement at its start: a filter's update is the step, a reference must still move."""
         t = number * span
-        carried = updated(filter, carried, t, measurements[number])
+        carried = updated(filter, carried, t, measurements[number], most)
         if filter.system.measurement == "discrete":
             carried = carried._replace(state=moved(carried.state, t))
         return carried
@@ -75,27 +88,40 @@ def follow(
             carried = segment(first, carried)
         else:
             carried = jax.lax.fori_loop(first, first + schedule.output_every, segment, carried)
-        return counted_anew(carried), (emitted(filter, carried.state), carried.scores)
+        return counted_anew(carried), (emitted(filter, carried.state), carried.senseless, carried.scores)
 
-    carried = Carried(start, jnp.zeros(lanes, int), nothing(lanes) if scores else None)
-    end, (outputs, found) = jax.lax.scan(to_output, carried, jnp.arange(schedule.outputs))
+    unmarked = jnp.zeros(lanes, bool)
+    carried = Carried(start, jnp.zeros(lanes, int), unmarked, nothing(lanes) if scores else None)
+    end, (outputs, senseless, found) = jax.lax.scan(to_output, carried, jnp.arange(schedule.outputs))
     return Followed(
         joined(filter, schedule, start, outputs, end.state),
         end.guarded,
         jnp.full(lanes, schedule.measurements),
+        from_start(senseless),
         from_start(found),
     )
 
 
-def updated(filter: Filter, carried: Carried, t: Any, y: Any) -> Carried:
-    """After the update at the measurements (m, L)."""
+def updated(filter: Filter, carried: Carried, t: Any, y: Any, most: Any = None) -> Carried:
+    """After the update at the measurements (m, L). most: as for `follow`."""
 
-    def one(state: Any, y: Any) -> tuple[Any, Any, Score | None]:
+    def one(state: Any, y: Any) -> tuple[Any, Any, Any, Score | None]:
+        senseless = beyond(filter, state, most)
         state, info = filter.update(state, t, y)
-        return state, info.guarded, None if carried.scores is None else score(filter, info)
+        return state, info.guarded, senseless, None if carried.scores is None else score(filter, info)
 
-    state, guarded, scores = over_lanes(one)(carried.state, y)
-    return Carried(state, carried.guarded + guarded, added(carried.scores, scores))
+    state, guarded, senseless, scores = over_lanes(one)(carried.state, y)
+    return Carried(
+        state, carried.guarded + guarded, carried.senseless | senseless, added(carried.scores, scores)
+    )
+
+
+def beyond(filter: Filter, state: Any, most: Any) -> Any:
+    """Decide whether a variance is not finite or beyond the square of `most`, with which an update loses all digits."""
+    if most is None:
+        return jnp.zeros((), bool)
+    P = filter.components(state).cov
+    return ~reduce(jnp.logical_and, [jnp.abs(P[i, i]) <= bound**2 for i, bound in enumerate(most)])
 
 
 def counted_anew(carried: Any) -> Any:
@@ -103,11 +129,9 @@ def counted_anew(carried: Any) -> Any:
     return carried if carried.scores is None else carried._replace(scores=emptied(carried.scores))
 
 
-def from_start(scores: Scores | None) -> Scores | None:
-    """The scores (T, L) of all output times: none at the start."""
-    if scores is None:
-        return None
-    return Scores(*(jnp.concatenate([jnp.zeros_like(part[:1]), part]) for part in scores))
+def from_start(found: Any) -> Any:
+    """What was found (T, L) until each output time, scores or another tree: nothing at the start."""
+    return jax.tree.map(lambda part: jnp.concatenate([jnp.zeros_like(part[:1]), part]), found)
 
 
 def begun(runner: Runner, lanes: int, keys: Any) -> Any:

@@ -1,4 +1,12 @@
-"""Errors of a filter against the truth, and its own idea of them: the tracks that the statistics take."""
+"""Errors of a filter against the truth, and its own idea of them: the tracks that the statistics take.
+
+A run has diverged by the system's rule, where an error is not finite, and, whatever the error, where the filter states
+moments of it that are not finite or beyond all sense: with an index for each coordinate, and a deviation s_i,
+  (1) |P_ij| > s_i s_j  or  |S_iii| > s_i^3
+s_i is a thousand times the larger of the clip of |error| i and the deviation that the filter started with; without a
+clip 1e12 times whatever is largest: a true state, an error, a deviation stated at the start. (1) is for good: digits
+are gone, and what a measurement makes of the rest, a variance of zero for one, is luck.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +22,13 @@ from nlbench.algebra.scalarise import scalarise
 from nlbench.updates.posterior import through_gain
 
 if TYPE_CHECKING:
+    from nlbench.engine.problem import Runner
     from nlbench.statistics.layout import Layout
     from nlbench.systems.discrete import DiscreteSystem
     from nlbench.systems.system import System
+
+CLIPS = 1e3  # stated deviations that are beyond all sense, in units of the clip or of the start
+SIZES = 1e12  # the same without a clip, in units of what is there; 1e-12 is what chance gives a fair filter
 
 
 class Judged(NamedTuple):
@@ -36,18 +48,53 @@ def judge(
     layout: Layout,
     states: Any,
     components: Any,
+    senseless: Any = False,
 ) -> Judged:
     """Compare the true states (T, n, L) with the moments (T, k, L) that a filter gave at the same times.
 
     rules: the system whose rules of divergence hold. model: the filter's, which says what the errors of its state are.
+    senseless: (T, L), whether it stated what is beyond all sense between the times.
     """
     # Of scalars: arrays inside would be transposed.
     each = jax.vmap(jax.vmap(lambda x, given: _one(rules, model, x, given)))
     apart = each(_apart(states), _apart(components))
     error, cov, third = (jnp.stack(part, axis=1) for part in apart[:3])
+    senseless |= beyond_sense(layout, states, error, cov, third)
+    diverged = apart.diverged | (jnp.cumsum(senseless, axis=0) > 0)
     return Judged(
-        error, cov, third, apart.nees, _late(rules, layout, error, _lasting(rules, layout, apart.diverged))
+        error, cov, third, apart.nees, _late(rules, layout, error, _lasting(rules, layout, diverged))
     )
+
+
+def beyond_sense(layout: Layout, states: Any, error: Any, cov: Any, third: Any) -> Any:
+    """Decide (1), at all times (T, L); of the joint third moments that are not cubes at the report times only."""
+    i, j = np.array(layout.components(2)).T
+    triples = np.array(layout.components(3))
+    cubes, reports = (triples == triples[:, :1]).all(1), np.asarray(layout.reports)
+    start = jnp.sqrt(jnp.maximum(cov[:1, i == j], 0.0))
+    clip = np.asarray(layout.clip)[:, None]
+    most = CLIPS * jnp.maximum(jnp.asarray(clip, cov.dtype), start)
+    if not np.isfinite(clip).all():
+        parts = (jnp.abs(states), jnp.abs(error), jnp.broadcast_to(start, error.shape))
+        size = reduce(jnp.maximum, (part.max(1, keepdims=True) for part in parts))
+        # Without any size there is nothing to compare with.
+        most = jnp.where(np.isfinite(clip), most, jnp.where(size > 0, SIZES * size, jnp.inf))
+    most = jnp.broadcast_to(most, error.shape)
+    sound = (jnp.abs(cov) <= most[:, i] * most[:, j]).all(1)
+    sound &= (jnp.abs(third[:, cubes]) <= most**3).all(1)
+    joint = jnp.abs(third[reports]) <= most[reports][:, triples].prod(2)
+    return ~sound.at[reports].set(sound[reports] & joint.all(1))
+
+
+def most_stated(layout: Layout, runner: Runner) -> np.ndarray | None:
+    """The deviations (n,) of (1) for the states of a filter; None where they are not those of the errors, where there
+    are no clips, and for filters that draw or remember, to which stating a covariance is dear."""
+    filter = runner.filter
+    own = filter.system.error is not None or filter.random or filter.history is not None
+    if own or not np.isfinite(layout.clip).any():
+        return None
+    start = np.sqrt(np.maximum(np.diagonal(np.asarray(runner.initial.cov, float)), 0.0))
+    return CLIPS * np.maximum(layout.clip, start)
 
 
 def _apart(array: Any) -> list[Any]:

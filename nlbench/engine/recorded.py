@@ -11,12 +11,14 @@ import jax
 import numpy as np
 
 from nlbench import filters, plugins, systems
-from nlbench.config.consistency import MOST_STEPS
 from nlbench.config.schema import PARTICLES, FilterSpec
+from nlbench.engine.failure import MOMENTS
 from nlbench.engine.problem import overridden
 from nlbench.engine.program_cache import use_cache
 from nlbench.errors import ConfigError, Problem, Problems
 from nlbench.filters import data
+from nlbench.results.reasons import not_finite
+from nlbench.samples import Pace, Ways, doubt_times, find_pace, refuse_length
 from nlbench.statistics.chi_square import quantile
 from nlbench.statistics.consistency import TAIL
 from nlbench.systems.system import kind
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
     from nlbench.config.recording import Recording
     from nlbench.filters.filter import Filter
 
+HERE = Ways("--start {}", "a longer --set time.step=")  # what a user of the command line gives
+
 
 class Foretold(NamedTuple):
     """How well a filter foretold the data.
@@ -35,8 +39,8 @@ class Foretold(NamedTuple):
     log_likelihood: of all of them; NaN where the filter's density was not positive at one of them.
     nis: mean of z' S^-1 z over `samples` measurements; `expected` is their mean number of entries. low, high: between
     them lie 95 % of the means of a filter that is right, by chi-square; NaN where there are no bounds, because some
-    updates were `altered` (`nlbench.filters.data.Followed`) and the others are a selection.
-    lost: the first row whose estimate is not finite, or None.
+    updates were `altered` or `invalid` (`nlbench.filters.data.Followed`) and the others are a selection.
+    lost: the first row whose estimate is not finite, or None; reason: in which part, and what was not finite.
     """
 
     log_likelihood: float
@@ -46,7 +50,9 @@ class Foretold(NamedTuple):
     high: float
     samples: int
     altered: int
+    invalid: int
     lost: int | None
+    reason: str
 
     @property
     def verdict(self) -> str:
@@ -61,11 +67,12 @@ class Foretold(NamedTuple):
 
 
 class Filtered(NamedTuple):
-    """A filter's label, the table of `nlbench.filter_data`, and how well it foretold the data."""
+    """A filter's label, the table of `nlbench.filter_data`, how well it foretold the data, and what is odd of times."""
 
     label: str
     table: pd.DataFrame
     foretold: Foretold
+    doubt: str
 
 
 def bound(experiment: Experiment, labels: Sequence[str]) -> list[Filter]:
@@ -95,26 +102,30 @@ def filtered(
     times = np.array(recording.times)
     y = np.array(recording.values).reshape(len(times), -1)
     problems = [each for label, f in zip(labels, made, strict=True) for each in _misfit(label, f, recording)]
-    problems += _too_long(experiment, made, recording, start)
+    refused = refuse_length(times, start, _pace(made), HERE)
+    problems += [Problem(refused, file=recording.file)] if refused else []
     if problems:
         raise ConfigError(problems)
+    doubt = doubt_times(times, start, _pace(made), HERE)
     use_cache()
     key = jax.random.key(experiment.monte_carlo.seed)
     for label, f in zip(labels, made, strict=True):
         followed = data.follow(f, times, y, start, key)
-        yield Filtered(label, data.table(f, followed, recording.names), foretold(followed))
+        yield Filtered(label, data.table(f, followed, recording.names), foretold(followed), doubt)
 
 
 def foretold(followed: data.Followed) -> Foretold:
     """The summary of what a filter said."""
-    fair = (followed.taken > 0) & ~followed.altered
-    samples, altered = int(fair.sum()), int(followed.altered.sum())
+    unfair = followed.altered | followed.invalid
+    fair = (followed.taken > 0) & ~unfair
+    samples = int(fair.sum())
     degrees = float(followed.taken[fair].sum())
     expected = degrees / samples if samples else math.nan
     low = high = math.nan
-    if samples and not altered:
+    if samples and not unfair.any():
         low, high = (quantile(tail, np.array([degrees])).item() / samples for tail in (TAIL, 1 - TAIL))
-    finite = np.isfinite(followed.mean).all(1) & np.isfinite(followed.variance).all(1)
+    wrong = followed.wrong[:, 1].any(1)
+    lost = int(wrong.argmax()) if wrong.any() else None
     return Foretold(
         log_likelihood=float(followed.log_likelihood.sum()),
         nis=float(followed.nis[fair].mean()) if samples else math.nan,
@@ -122,9 +133,18 @@ def foretold(followed: data.Followed) -> Foretold:
         low=low,
         high=high,
         samples=samples,
-        altered=altered,
-        lost=None if finite.all() else int(np.argmin(finite)),
+        altered=int(followed.altered.sum()),
+        invalid=int(followed.invalid.sum()),
+        lost=lost,
+        reason="" if lost is None else _reason(followed.wrong[lost]),
     )
+
+
+def _reason(wrong: np.ndarray) -> str:
+    """Say in which part, and what, first was not finite; wrong: (2, 2), as in `nlbench.filters.data.Followed`."""
+    part = int(wrong.any(1).argmax())
+    names = [name for name, bad in zip(MOMENTS, wrong[part], strict=False) if bad]
+    return f"in the {('propagation', 'update')[part]}: {not_finite(names)}"
 
 
 def _specs(experiment: Experiment) -> list[FilterSpec]:
@@ -166,14 +186,7 @@ def _misfit(label: str, f: Filter, recording: Recording) -> Iterator[Problem]:
         yield Problem(f"{found}, but the system of '{label}' measures {m}{hint}", file=recording.file, line=1)
 
 
-def _too_long(
-    experiment: Experiment, made: Sequence[Filter], recording: Recording, start: float
-) -> Iterator[Problem]:
-    span = recording.times[-1] - start
-    discrete = any(kind(f.system).discrete for f in made)
-    step = 1.0 if discrete else experiment.time.step
-    if span / step > MOST_STEPS:
-        message = (
-            f"{span / step:.2g} steps of {step:g} from the start to the last row, more than {MOST_STEPS:,}"
-        )
-        yield Problem(f"{message}; --start says when the filters start", file=recording.file)
+def _pace(made: Sequence[Filter]) -> Pace:
+    """The shortest steps of all filters."""
+    paces = [find_pace(f) for f in made]
+    return paces[0]._replace(step=min((each.step for each in paces if each.step), default=None))

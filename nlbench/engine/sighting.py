@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from nlbench.engine.follow import Followed, begun, counted_anew, emitted, from_start, joined, over_lanes
+from nlbench.engine.follow import (
+    Followed,
+    begun,
+    beyond,
+    counted_anew,
+    emitted,
+    from_start,
+    joined,
+    over_lanes,
+)
 from nlbench.engine.scores import Score, added, nothing, score
 from nlbench.orbit import wrapped
 from nlbench.statistics.tracks import Scores
@@ -31,11 +40,17 @@ class Progress(NamedTuple):
     due: Any
     made: Any
     guarded: Any
+    senseless: Any
     scores: Scores | None
 
 
-def follow_sightings(problem: Problem, runner: Runner, data: Simulated, scores: bool = False) -> Followed:
-    """The filter along the truth (steps + 1, n, L) of a block, whose sightings have the noise (K, m, L)."""
+def follow_sightings(
+    problem: Problem, runner: Runner, data: Simulated, scores: bool = False, most: Any = None
+) -> Followed:
+    """The filter along the truth (steps + 1, n, L) of a block, whose sightings have the noise (K, m, L).
+
+    most: as for `follow`.
+    """
     schedule, lanes, filter = problem.schedule, problem.block, runner.filter
     truth, seen_angle = getattr(problem.truth, "sightings", None), filter.angle
     if truth is None or seen_angle is None:
@@ -64,17 +79,19 @@ def follow_sightings(problem: Problem, runner: Runner, data: Simulated, scores: 
             number, x, noise
         )
 
-        def one(state: Any, y: Any, number: Any) -> tuple[Any, Any, Score | None]:
+        def one(state: Any, y: Any, number: Any) -> tuple[Any, Any, Any, Score | None]:
+            senseless = beyond(filter, state, most)
             state, info = filter.update(state, t, y, sighting=number)
-            return state, info.guarded, score(filter, info) if scores else None
+            return state, info.guarded, senseless, score(filter, info) if scores else None
 
-        updated, guarded, gained = over_lanes(one)(before.state, y, number)
+        updated, guarded, senseless, gained = over_lanes(one)(before.state, y, number)
         due = before.due
         return before._replace(
             state=jax.tree.map(lambda new, old: jnp.where(due, new, old), updated, before.state),
             due=jnp.zeros_like(due),
             made=before.made + due,
             guarded=before.guarded + (guarded & due),
+            senseless=before.senseless | (senseless & due),
             scores=added(before.scores, gained, due),
         )
 
@@ -87,7 +104,7 @@ def follow_sightings(problem: Problem, runner: Runner, data: Simulated, scores: 
             return jax.lax.cond(jnp.any(now.due), measured, lambda now: now, now)
 
         after = jax.lax.while_loop(lambda now: now.step < last, leg, before)
-        return counted_anew(after), (emitted(filter, after.state), after.scores)
+        return counted_anew(after), (emitted(filter, after.state), after.senseless, after.scores)
 
     state = begun(runner, lanes, data.key)
     none = jnp.zeros(lanes, int)
@@ -98,8 +115,9 @@ def follow_sightings(problem: Problem, runner: Runner, data: Simulated, scores: 
         due=jnp.zeros(lanes, bool),
         made=none,
         guarded=none,
+        senseless=jnp.zeros(lanes, bool),
         scores=nothing(lanes) if scores else None,
     )
-    end, (outputs, found) = jax.lax.scan(to_output, start, jnp.arange(schedule.outputs))
+    end, (outputs, senseless, found) = jax.lax.scan(to_output, start, jnp.arange(schedule.outputs))
     components = joined(filter, schedule, state, outputs, end.state)
-    return Followed(components, end.guarded, end.made, from_start(found))
+    return Followed(components, end.guarded, end.made, from_start(senseless), from_start(found))

@@ -54,7 +54,9 @@ class LinearisedOptions(Options):
     @model_validator(mode="after")
     def _fit(self) -> LinearisedOptions:
         if self.propagation == "transition" and self.integrator != Integrator():
-            raise ValueError("propagation: transition makes steps of rk4: leave integrator out, or take moments")
+            raise ValueError(
+                "propagation: transition makes steps of rk4: leave integrator out, or take moments"
+            )
         return self
 
 
@@ -67,7 +69,11 @@ class CurvedOptions(Options):
 class TemperingOptions(CurvedOptions):
     """Options of the integration update."""
 
-    steps: PositiveInt = Field(default=5, le=100_000, description="RK4 steps in pseudo-time")
+    steps: PositiveInt | None = Field(
+        default=None,
+        le=100_000,
+        description="equal RK4 steps in pseudo-time; default: 5 or more, by the information that is let in",
+    )
     measurement: Literal["linear", "quadratic"] = Field(
         default="linear", description="expand the measurement to first or to second order"
     )

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nlbench.errors import ConfigError
-from nlbench.systems.discrete import DiscreteSystem
+from nlbench.samples import IN_PYTHON, doubt_times, find_pace, read_samples
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from nlbench.filters.filter import Filter, UpdateInfo
+    from nlbench.moments.moments import Moments
 
 
 class Followed(NamedTuple):
@@ -19,8 +21,10 @@ class Followed(NamedTuple):
 
     times: (T,). mean, variance: (T, n), after the measurement. innovation: (T, m), NaN where nothing was measured.
     nis: (T,), NaN where none was measured. log_likelihood: (T,), 0 there.
-    taken: (T,), the number of entries measured. altered: (T,), whether the limiter clipped an entry of the residual,
-    the guard replaced the update, or the innovation's covariance was not positive definite: then NIS is no fair sample.
+    taken: (T,), the number of entries measured. altered: (T,), whether the limiter clipped an entry of the residual or
+    the guard replaced the update; invalid: (T,), whether the innovation was not finite or its covariance not positive
+    definite: then NIS is no fair sample. wrong: (T, 2, 2), after propagation and after the update, whether mean and
+    covariance were not finite.
     """
 
     times: Any
@@ -31,6 +35,8 @@ class Followed(NamedTuple):
     log_likelihood: Any
     taken: Any
     altered: Any
+    invalid: Any
+    wrong: Any
 
 
 def filter_data(
@@ -38,17 +44,26 @@ def filter_data(
 ) -> pd.DataFrame:
     """The filter `f` from its system's initial moments at t0 along measurements y at `times`: one row for each.
 
-    times: (T,), not descending, none before t0; step numbers where time is discrete. y: (T, m), or (T,) for m = 1; NaN
-        means not measured, and a row without measurements is a prediction.
+    times: (T,), not descending, none before t0; step numbers where time is discrete, else numbers in the system's unit,
+        durations (timedelta64), which are taken in seconds, or dates (datetime64), which are taken in seconds from t0,
+        then a date as well.
+    y: (T, m), or (T,) for m = 1; NaN, None or masked means not measured; a row without measurements is a prediction.
     key: of filters that draw random numbers; None means seed 0.
     measurements: names of what y holds; default y1 ... ym (y for one).
     Columns: `time`; `<name>_mean` and `<name>_variance` of each state after the measurement; `<measurement>_innovation`
     of each measurement, what was measured minus what was foretold, NaN where nothing was; `nis`, the innovation squared
     over its covariance, chi-square distributed with as many degrees as entries were measured if the model is right,
     NaN where none was; `log_likelihood` of the measurement, 0 where there was none: its sum is that of the data.
-    Raises `ConfigError` where times or shapes do not fit, and for continuous measurements.
+    Warns where the first row lies far after t0, or where times seem to be in another unit. Raises `ConfigError` where
+    times or shapes do not fit, where y is infinite or no number, for more than 1e9 steps, and for continuous
+    measurements.
     """
-    return table(f, follow(f, times, y, t0, key), measurements)
+    _check_filter(f)
+    samples = read_samples(f, times, y, t0)
+    doubt = doubt_times(samples.times, samples.start, find_pace(f), IN_PYTHON)
+    if doubt:
+        warnings.warn(f"{f.name}: {doubt}", stacklevel=2)
+    return table(f, follow(f, *samples, key), measurements)
 
 
 def follow(f: Filter, times: Any, y: Any, t0: Any = 0, key: Any = None) -> Followed:
@@ -57,16 +72,19 @@ def follow(f: Filter, times: Any, y: Any, t0: Any = 0, key: Any = None) -> Follo
     import jax.numpy as jnp
     import numpy as np
 
-    times, y = _checked(f, np.asarray(times), np.asarray(y, float), t0)
+    _check_filter(f)
+    times, y, t0 = read_samples(f, times, y, t0)
     first, *pairs = _keys(key, len(times))
 
     def one(carry: tuple[Any, Any], given: tuple[Any, ...]) -> tuple[tuple[Any, Any], tuple[Any, ...]]:
         (state, before), (t, values, predicting, updating) = carry, given
-        state = f.predict(state, before, t, predicting)
-        state, info = f.update(state, t, values, updating)
+        prior = f.predict(state, before, t, predicting)
+        state, info = f.update(prior, t, values, updating)
         moments, z = f.moments(state), info.innovation
         nis = z @ jnp.linalg.solve(info.innovation_cov, z)
-        said = (moments.mean, jnp.diagonal(moments.cov), z, nis, info.log_likelihood, _altered(f, info))
+        wrong = jnp.stack([_wrong(f.moments(prior)), _wrong(moments)])
+        unfair = _altered(f, info), _invalid(info)
+        said = (moments.mean, jnp.diagonal(moments.cov), z, nis, info.log_likelihood, *unfair, wrong)
         return (state, t), said
 
     @jax.jit
@@ -75,7 +93,7 @@ def follow(f: Filter, times: Any, y: Any, t0: Any = 0, key: Any = None) -> Follo
 
     start = f.init(f.system.initial, first)
     said = along(start, (jnp.asarray(times), jnp.asarray(y), *pairs))
-    mean, variance, innovation, nis, log_likelihood, altered = (np.asarray(part) for part in said)
+    mean, variance, innovation, nis, log_likelihood, altered, invalid, wrong = map(np.asarray, said)
     there = ~np.isnan(y)
     some = there.any(1)
     return Followed(
@@ -86,7 +104,9 @@ def follow(f: Filter, times: Any, y: Any, t0: Any = 0, key: Any = None) -> Follo
         nis=np.where(some, nis, np.nan),
         log_likelihood=np.where(some, log_likelihood, 0.0),
         taken=there.sum(1),
-        altered=altered & some,
+        altered=altered & some & ~invalid,
+        invalid=invalid & some,
+        wrong=wrong,
     )
 
 
@@ -114,45 +134,38 @@ def _keys(key: Any, count: int) -> tuple[Any, Any, Any]:
 
 
 def _altered(f: Filter, info: UpdateInfo) -> Any:
-    """Whether an entry was clipped, the guard replaced the update, or the innovation's covariance is none."""
+    """Decide whether an entry was clipped or the guard replaced the update."""
     import jax.numpy as jnp
 
     z, S = info.innovation, info.innovation_cov
-    altered = info.guarded | jnp.isnan(jnp.linalg.cholesky(S)).any()
-    return altered if f.limiter is None else altered | jnp.any(z * z > f.limiter**2 * jnp.diagonal(S))
+    if f.limiter is None:
+        return jnp.asarray(info.guarded)
+    return info.guarded | jnp.any(z * z > f.limiter**2 * jnp.diagonal(S))
 
 
-def _checked(f: Filter, times: Any, y: Any, t0: Any) -> tuple[Any, Any]:
-    """Times (T,), whole numbers where time is discrete, and measurements (T, m)."""
-    import numpy as np
+def _invalid(info: UpdateInfo) -> Any:
+    """Decide whether the innovation is not finite or its covariance none."""
+    import jax.numpy as jnp
 
-    system: Any = f.system
-    m = system.measurements
-    if getattr(system, "measurement", "discrete") == "continuous":
+    root = jnp.linalg.cholesky(info.innovation_cov)
+    return ~(jnp.isfinite(info.innovation).all() & jnp.isfinite(root).all())
+
+
+def _wrong(moments: Moments) -> Any:
+    """Decide whether the mean and the covariance are not finite: (2,)."""
+    import jax.numpy as jnp
+
+    return jnp.stack([~jnp.isfinite(part).all() for part in (moments.mean, moments.cov)])
+
+
+def _check_filter(f: Filter) -> None:
+    """Raises `ConfigError` for a filter that does not expect measurements one after another."""
+    if getattr(f.system, "measurement", "discrete") == "continuous":
         raise ConfigError(
             f"{f.name}: filter_data takes measurements at discrete times, the system's are continuous"
         )
     if f.history is not None:
         raise ConfigError(f"{f.name}: does not say what it expects of a measurement before it comes")
-    if y.ndim == 1 and m == 1:
-        y = y[:, None]
-    if times.ndim != 1 or not len(times):
-        raise ConfigError(f"times: got shape {times.shape}, expected (T,) with T at least 1")
-    if y.shape != (len(times), m):
-        raise ConfigError(
-            f"y: got shape {y.shape}, expected ({len(times)}, {m}): {len(times)} times, {m} measured"
-        )
-    if not np.isfinite(times.astype(float)).all():
-        raise ConfigError("times: must be finite")
-    steps = np.diff(np.concatenate([[t0], times]))
-    if (steps < 0).any():
-        row = int(np.argmax(steps < 0))
-        raise ConfigError(f"times: {times[row]} in row {row} comes after {times[row - 1] if row else t0}")
-    if not isinstance(system, DiscreteSystem):
-        return times.astype(float), y
-    if (times != np.round(times)).any() or t0 != round(t0):
-        raise ConfigError("times: must be step numbers, since the system's time is discrete")
-    return times.astype(int), y
 
 
 def _state_names(f: Filter) -> list[str]:

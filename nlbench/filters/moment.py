@@ -25,7 +25,7 @@ from nlbench.moments import integrate as integration
 from nlbench.moments.equations import fourth_moment_rate, rates
 from nlbench.moments.moments import Components, Moments, dense, to_components, to_full
 from nlbench.updates.density import gaussian_log_density
-from nlbench.updates.guard import fallback, guarded
+from nlbench.updates.guard import either, fallback, guarded, integrable
 from nlbench.updates.hermite3 import hermite3, sub1, sub2
 from nlbench.updates.hermite4 import hermite4
 from nlbench.updates.kalman import kalman
@@ -65,6 +65,7 @@ CURVED: dict[str, Callable[[Any], Callable[[Components, Seen], Outcome]]] = {
     "direct": lambda options: partial(direct, points=options.points),
     "quadrature": lambda options: partial(quadrature, points=options.points),
 }
+DENSITIES = ("direct", "quadrature")  # integrate over densities
 
 
 def build(name: str, row: Row, system: System, options: Options) -> Filter:
@@ -184,16 +185,19 @@ def _curved_update(
     clipped = None if options.limiter is None else limited(measurement.z, gained.S, options.limiter)
     seen = see(system, t, state, y, measurement, gained, clipped)
     moments, nu, log_likelihood = CURVED[row.update](options)(state, seen)
-    fired = jnp.zeros((), bool)
+    fired, safe = jnp.zeros((), bool), kalman(state, gained, seen.z, seen.z).moments
+    safe = safe if row.order == 2 else fallback(state, gained, seen.z)
+    if (
+        row.update in DENSITIES
+    ):  # moments that integration left without a density take Kalman's update, which is counted
+        sound = integrable(state, gained)
+        moments, nu = either(sound, moments, safe), jnp.where(sound, nu, 0.0)
+        fired = ~sound & jnp.isfinite(gained.S[0, 0])
     if options.guard == "sub1":
-        safe = (
-            kalman(state, gained, seen.z, seen.z).moments
-            if row.order == 2
-            else fallback(state, gained, seen.z)
-        )
-        moments, fired = guarded(Posterior(moments, nu), safe)
-        gaussian = gaussian_log_density(seen.z, gained, seen.taken, seen.slack)
-        log_likelihood = jnp.where(fired, gaussian, log_likelihood)
+        moments, lost = guarded(Posterior(moments, nu), safe)
+        fired = fired | lost
+    gaussian = gaussian_log_density(seen.z, gained, seen.taken, seen.slack)
+    log_likelihood = jnp.where(fired, gaussian, log_likelihood)
     moments = dense(moments)
     if options.missing:  # nothing taken: the prior, to the last bit
         some = seen.taken > 0

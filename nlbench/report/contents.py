@@ -11,6 +11,7 @@ from nlbench.report import tables, winners
 from nlbench.report.moments import moments
 from nlbench.report.numbers import duration, measured, percent, plain
 from nlbench.report.pictures import embedded
+from nlbench.results.reasons import told
 
 if TYPE_CHECKING:
     from nlbench.results.results import Results
@@ -24,7 +25,9 @@ def contents(results: Results, drawn: list[Path]) -> dict[str, Any]:
     found = winners.winners(read, statistic)
     last = max((winner.time for winner in found), default=0.0)
     optional = {
-        name: results.table(name) for name in ("claims", "sets", "cost", "moments") if name in results.tables
+        name: results.table(name)
+        for name in ("claims", "sets", "cost", "moments", "failures")
+        if name in results.tables
     }
     return {
         "question": experiment.question or experiment.experiment,
@@ -44,6 +47,9 @@ def contents(results: Results, drawn: list[Path]) -> dict[str, Any]:
         ],
         "any_diverged": read.any_diverged,
         "divergence": tables.divergence(read),
+        "failures": [(row["filter"], told(row)) for row in optional["failures"].to_dict("records")]
+        if "failures" in optional
+        else [],
         "consistency": tables.consistency(read, experiment.report_times),
         "cost": tables.cost(optional["cost"]) if "cost" in optional else None,
         "figures": embedded(drawn),

@@ -11,6 +11,7 @@ import pandas as pd
 from nlbench.figures.data import Data
 from nlbench.report.numbers import listed, measured, percent, plain, ranged, share, uncertain
 from nlbench.report.winners import WORDS, Winner
+from nlbench.results.reasons import left_out
 
 LONG = 30  # letters
 VERDICTS = {"confirmed": "✓ confirmed", "refuted": "✗ refuted", "undecided": "? undecided"}
@@ -125,8 +126,13 @@ def consistency(data: Data, times: Iterable[float]) -> Table | None:
     found = {(row["filter"], row["score"], row["time"]): row for row in table.to_dict("records")}
     there = [column for column in columns if any((label, *column[:2]) in found for label in data.filters)]
     dof = {score: int(rows["dof"].iloc[0]) for score, rows in table.groupby("score")}
+    saved = data.saved("left_out")
+    omitted = {} if saved is None else {(row["filter"], row["time"]): row for row in saved.to_dict("records")}
     rows = [
-        [name(label), *(_consistency(found.get((label, score, time))) for score, time, _ in there)]
+        [
+            name(label),
+            *(_consistency(found.get((label, *at)), omitted.get((label, at[1]))) for *at, _ in there),
+        ]
         for label in data.filters
     ]
     right = listed([f"{score.upper()} {dof[score]}" for score in ("nees", "nis") if score in dof])
@@ -136,13 +142,15 @@ def consistency(data: Data, times: Iterable[float]) -> Table | None:
     return Table("consistency", caption, ["filter", *(words for *_, words in there)], rows)
 
 
-def _consistency(row: dict[str, Any] | None) -> Cell:
-    """A mean, and on which side of its bounds it lies if it has some and is not within them."""
+def _consistency(row: dict[str, Any] | None, omitted: dict[str, Any] | None) -> Cell:
+    """A mean, and on which side of its bounds it lies if it has some and is not within them; omitted: a row of the
+    table `left_out`."""
     if row is None or math.isnan(row["value"]):
         return number("–", math.nan)
     cell = number(uncertain(row["value"], row["stderr"]), row["value"])
     if pd.isna(row["consistent"]):
-        return cell._replace(text=f"{cell.text}, selected")
+        words = f"; left out: {left_out(omitted)}" if omitted and row["score"] == "nis" else ""
+        return cell._replace(text=f"{cell.text}, selected{words}")
     if row["consistent"]:
         return cell._replace(text=f"{cell.text}, consistent")
     words = "overconfident" if row["value"] > row["high"] else "too cautious"

@@ -25,8 +25,8 @@ def consistency_table(totals: Totals, statistics: pd.DataFrame, measurements: in
     """`filter, time, score, value, stderr, low, high, dof, n, consistent` of the joint NEES and the NIS.
 
     time: text, as in the table of statistics. n: what the mean is over, runs for NEES and samples for NIS. Where some
-    samples were left out (by a limiter or a guard), the others are a selection, for which there are no bounds;
-    consistent is then missing, as it is where nothing was counted. measurements: entries of a measurement.
+    samples were left out (`left_out_table`), the others are a selection, for which there are no bounds; consistent
+    is then missing, as it is where nothing was counted. measurements: entries of a measurement.
     """
     layout = totals.layout
     rows = statistics[(statistics["coordinate"] == "all") & statistics["statistic"].isin(["nees", "nis"])]
@@ -43,16 +43,29 @@ def consistency_table(totals: Totals, statistics: pd.DataFrame, measurements: in
     return made.reset_index(drop=True)[list(COLUMNS)]
 
 
-def _selected(totals: Totals, rows: pd.DataFrame) -> np.ndarray:
-    """Whether samples were left out of a row's NIS."""
+def left_out_table(totals: Totals) -> pd.DataFrame:
+    """`filter, time, limited_or_guarded, invalid`: the measurements since the output time before (at `all`: of the runs
+    that were never lost) of which NIS has no sample; only where there are some.
+
+    invalid: foretold without a finite mean and a positive definite covariance.
+    """
     layout = totals.layout
-    if "left_out" not in totals.groups:
-        return np.zeros(len(rows), bool)
-    left_out = totals.groups["left_out"].sum(0) > 0
+    counts = totals.groups.get("left_out", np.zeros((1, 2, len(layout.filters), len(layout.times)))).sum(0)
     times = [*(repr(float(time)) for time in layout.times[1:]), "all"]
-    places = {
-        (label, time): left_out[f, t]
-        for f, label in enumerate(layout.filters)
-        for t, time in enumerate(times)
-    }
-    return np.array([places.get(key, False) for key in zip(rows["filter"], rows["time"], strict=True)], bool)
+    f, t = np.nonzero(counts.sum(0))
+    limited_or_guarded, invalid = counts[:, f, t].astype(np.int64)
+    return pd.DataFrame(
+        {
+            "filter": np.array(layout.filters, object)[f],
+            "time": np.array(times, object)[t],
+            "limited_or_guarded": limited_or_guarded,
+            "invalid": invalid,
+        }
+    )
+
+
+def _selected(totals: Totals, rows: pd.DataFrame) -> np.ndarray:
+    """Decide whether samples were left out of a row's NIS."""
+    table = left_out_table(totals)
+    places = set(zip(table["filter"], table["time"], strict=True))
+    return np.array([key in places for key in zip(rows["filter"], rows["time"], strict=True)], bool)

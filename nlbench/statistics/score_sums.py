@@ -12,16 +12,17 @@ def score_sums(scores: Scores, alive: Bool[Array, "F T L"]) -> dict[str, Array]:
     """Sums over the lanes that are real and not lost, (F, times) with the start left out, before any measurement.
 
     nis: (6, F, T): runs with samples, samples c, sums a of NIS, a^2, a c, c^2; the last time is all of them together.
-    left_out: (F, T), alike. log_likelihood: (3, F, T - 1): runs, values, squares.
+    left_out: (2, F, T), alike: limited or guarded, and invalid. log_likelihood: (3, F, T - 1): runs, values, squares.
     """
-    never = alive.all(1, keepdims=True)
+    never = jnp.broadcast_to(alive.all(1, keepdims=True), alive.shape)
     value = jnp.where(alive, scores.log_likelihood, jnp.nan)[:, 1:]
     finite = jnp.isfinite(value * value)
     value = jnp.where(finite, value, 0)
-    left_out = [jnp.where(kept, scores.left_out, 0)[:, 1:] for kept in (alive, never)]
+    left_out = jnp.stack([scores.left_out, scores.invalid])[:, :, 1:]
+    here, never_lost = (jnp.where(kept[:, 1:], left_out, 0).sum(-1) for kept in (alive, never))
     return {
         "nis": jnp.concatenate([_ratio(scores, alive), _ratio(scores, never, together=True)], axis=-1),
-        "left_out": jnp.concatenate([left_out[0].sum(-1), left_out[1].sum((1, 2))[:, None]], axis=-1),
+        "left_out": jnp.concatenate([here, never_lost.sum(-1, keepdims=True)], axis=-1),
         "log_likelihood": jnp.stack(
             [finite.sum(-1).astype(value.dtype), value.sum(-1), (value * value).sum(-1)]
         ),

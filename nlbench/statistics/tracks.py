@@ -9,16 +9,17 @@ class Scores(NamedTuple):
     """How well each filter foretold the measurements; axes as below.
 
     A sample is a measurement of which the filter foretold mean and covariance. Left out are those whose residual a
-    limiter clipped, those whose update the guard replaced, and those foretold with a covariance that is not positive
-    definite: what is left then is a selection, smaller than a right filter's.
+    limiter clipped and those whose update the guard replaced; invalid those foretold without a finite mean and a
+    positive definite covariance: what remains is a selection, smaller than a right filter's.
     """
 
     nis: Float[
         Array, "F T L"
     ]  # sum of the normalised innovations squared of the samples since the output before
     samples: Int[Array, "F T L"]  # how many those are
-    left_out: Int[Array, "F T L"]  # how many there were beside them
+    left_out: Int[Array, "F T L"]  # how many were limited or guarded
     log_likelihood: Float[Array, "F T L"]  # sum over all measurements so far
+    invalid: Int[Array, "F T L"]  # how many were foretold without a valid mean and covariance
 
 
 class Tracks(NamedTuple):

@@ -32,7 +32,7 @@ def tempering_rates(
     if M is not None and moments.fourth is not None:
         raise ValueError("tempering_rates: a fourth moment goes with a linear measurement only (M=None)")
     state, H, z, noise, mean = _components(moments, H, z, R, prior_mean)
-    return _full(state, tempering.rates(state, mean, z, H, _curvature(M), noise, equations)[0])
+    return _full(state, tempering.rates(state, mean, z, H, _curvature(M), noise, equations).moments)
 
 
 def two_step_rates(
@@ -52,7 +52,7 @@ def two_step_rates(
     """
     state, H, z, noise, mean = _components(moments, H, z, R, prior_mean)
     M = _curvature(M)
-    return _full(state, two_step.rates(s, state, mean, z, H, M, noise, equations, closure)[0])
+    return _full(state, two_step.rates(s, state, mean, z, H, M, noise, equations, closure).moments)
 
 
 def _components(

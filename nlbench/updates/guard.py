@@ -31,7 +31,14 @@ def guarded(posterior: Posterior, instead: Components) -> tuple[Components, Any]
     """The posterior, or `instead` where 1 + nu < .25 or the covariance is not positive definite; and whether that was
     so (a prior that is not finite does not count)."""
     sound = (1 + posterior.nu >= LEAST_DENSITY_RATIO) & positive_definite(posterior.moments.cov)
-    chosen = jax.tree.map(
-        lambda full, safe: jnp.where(sound, full, safe), dense(posterior.moments), dense(instead)
-    )
-    return chosen, ~sound & jnp.isfinite(posterior.nu)
+    return either(sound, posterior.moments, instead), ~sound & jnp.isfinite(posterior.nu)
+
+
+def integrable(prior: Components, gain: Gain) -> Any:
+    """Whether the Gaussians of prior and linearised posterior have densities, over which an update can integrate."""
+    return positive_definite(prior.cov) & positive_definite(gain.omega)
+
+
+def either(sound: Any, moments: Components, instead: Components) -> Components:
+    """The moments where they are sound, else those instead."""
+    return jax.tree.map(lambda full, safe: jnp.where(sound, full, safe), dense(moments), dense(instead))

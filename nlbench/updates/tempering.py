@@ -24,13 +24,13 @@ from nlbench.moments.moments import Components
 from nlbench.updates import pseudo_time
 from nlbench.updates.density import gaussian_log_density
 from nlbench.updates.nonlinear import Outcome, Seen, weighted
-from nlbench.updates.pseudo_time import Derivatives, expected
+from nlbench.updates.pseudo_time import Derivatives, Rates, expected
 
 
 def tempering(
     prior: Components,
     seen: Seen,
-    steps: int = 5,
+    steps: int | None = None,
     measurement: str = "linear",
     equations: str = "corrected",
 ) -> Outcome:
@@ -38,10 +38,11 @@ def tempering(
     M = seen.curvature() if measurement == "quadratic" else None
     noise = inverse(seen.R)
 
-    def rate(s: Any, moments: Components) -> tuple[Components, Any]:
+    def rate(s: Any, moments: Components) -> Rates:
         return rates(moments, prior.mean, seen.z, seen.gain.H, M, noise, equations)
 
-    moments, gained = pseudo_time.integrated(rate, prior, steps)
+    let_in = information(prior.cov, seen.gain.H, M, noise) if steps is None else 0.0
+    moments, gained = pseudo_time.integrated(rate, prior, steps, let_in)
     log_density = gained - 0.5 * (log_determinant(seen.R) + seen.taken * jnp.log(2 * jnp.pi))
     nu = jnp.expm1(log_density - gaussian_log_density(seen.z, seen.gain, seen.taken, seen.slack))
     return Outcome(moments, nu, log_density)
@@ -55,8 +56,8 @@ def rates(
     M: Tensor | None,
     noise: Tensor,
     equations: str = "corrected",
-) -> tuple[Components, Any]:
-    """Rates of the moments and of the log evidence. z: residual at the prior mean; noise: R^-1; M: None if linear."""
+) -> Rates:
+    """Rates in pseudo-time. z: residual at the prior mean; noise: R^-1; M: None if linear."""
     g = moments.mean - prior_mean
     if M is None:
         D = linear(z - einsum("ra,a->r", H, g), H, noise, moments.cov)
@@ -64,10 +65,20 @@ def rates(
         Mg = einsum("rab,b->ra", M, g)
         r0 = z - einsum("ra,a->r", H, g) - einsum("ra,a->r", Mg, g)  # (1)
         D = quadratic(r0, H + 2.0 * Mg, M, noise, moments.cov)
-    found, evidence = pseudo_time.rates(moments, D)
+    found = pseudo_time.rates(moments, D)
     if equations == "printed":
-        found = found._replace(mean=einsum("ia,a->i", moments.cov, D.first))  # (3)
-    return found, evidence
+        mean = einsum("ia,a->i", moments.cov, D.first)  # (3)
+        found = found._replace(moments=found.moments._replace(mean=mean))
+    return found
+
+
+def information(P: Tensor, H: Tensor, M: Tensor | None, noise: Tensor) -> Any:
+    """Compute the variance of h, over that of the noise: tr((H P H' + 2 M P M P) R^-1)."""
+    found = einsum("ra,ab,sb,rs->", H, P, H, noise)[()]
+    if M is not None:
+        MP = einsum("rac,cb->rab", M, P)
+        found = found + 2.0 * einsum("rab,sba,rs->", MP, MP, noise)[()]
+    return jnp.asarray(found, float)
 
 
 def linear(r0: Tensor, H: Tensor, noise: Tensor, P: Tensor) -> Derivatives:

@@ -24,7 +24,7 @@ from nlbench.updates.density import gaussian_log_density
 from nlbench.updates.hermite3 import hermite3
 from nlbench.updates.kalman import kalman
 from nlbench.updates.nonlinear import Outcome, Seen
-from nlbench.updates.pseudo_time import Derivatives, expected
+from nlbench.updates.pseudo_time import Derivatives, Rates, expected
 
 
 def two_step(
@@ -38,7 +38,7 @@ def two_step(
     straight = (kalman if prior.third is None else hermite3)(prior, seen.gain, seen.z, seen.z)
     M, noise = seen.curvature(), inverse(seen.R)
 
-    def rate(s: Any, moments: Components) -> tuple[Components, Any]:
+    def rate(s: Any, moments: Components) -> Rates:
         return rates(s, moments, prior.mean, seen.z, seen.gain.H, M, noise, equations, closure)
 
     moments, gained = pseudo_time.integrated(rate, straight.moments, steps)
@@ -58,17 +58,18 @@ def rates(
     noise: Tensor,
     equations: str = "corrected",
     closure: Closure | None = None,
-) -> tuple[Components, Any]:
-    """Rates of the moments and of the log evidence. z: residual at the prior mean; noise: R^-1.
+) -> Rates:
+    """Rates in pseudo-time. z: residual at the prior mean; noise: R^-1.
 
     closure: None is the one of the equations: quasi-moment if corrected, cumulant if printed.
     """
     printed = equations == "printed"
     D = derivatives(s, moments, prior_mean, z, H, M, noise)
-    found, evidence = pseudo_time.rates(moments, D, closure or ("cumulant" if printed else "quasi-moment"))
-    if printed and found.third is not None:
-        found = found._replace(third=found.third + placements(3, "ij,k->ijk", moments.cov, found.mean))
-    return found, evidence
+    found = pseudo_time.rates(moments, D, closure or ("cumulant" if printed else "quasi-moment"))
+    if printed and found.moments.third is not None:
+        third = found.moments.third + placements(3, "ij,k->ijk", moments.cov, found.moments.mean)
+        found = found._replace(moments=found.moments._replace(third=third))
+    return found
 
 
 def derivatives(

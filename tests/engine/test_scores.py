@@ -5,12 +5,15 @@ from __future__ import annotations
 from functools import partial
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import nlbench as nb
 from nlbench.engine.block import block_tracks, make_chunk, words
 from nlbench.engine.problem import make
+from nlbench.engine.scores import Score, added, nothing, score
+from nlbench.filters.filter import UpdateInfo
 from nlbench.simulate import Trajectory, seed_key, simulate
 from tests.engine.test_sightings import END, SEED, STEP, stated, turning
 from tests.small_runs import experiment
@@ -31,6 +34,31 @@ def followed(problem, seed):
     """The scores of the first block."""
     lanes = jax.tree.map(lambda part: part[0], make_chunk(problem, 0, 1, 1, problem.block).lanes)
     return jax.jit(lambda lanes: block_tracks(problem, words(seed), lanes, 0)[0])(lanes)
+
+
+@pytest.mark.parametrize(
+    ("z", "S", "guarded", "left_out", "invalid"),
+    [
+        ([0.5, 1.0], np.eye(2), False, 0, 0),
+        ([0.5, 3.0], np.eye(2), False, 1, 0),  # beyond the limiter's two deviations
+        ([0.5, 1.0], np.eye(2), True, 1, 0),
+        ([0.5, np.nan], np.eye(2), False, 0, 1),
+        ([0.5, 1.0], np.full((2, 2), np.nan), False, 0, 1),
+        ([0.5, 1.0], np.diag([1.0, -1.0]), False, 0, 1),
+        ([0.5, 1.0], np.diag([np.inf, np.inf]), False, 0, 1),
+        ([0.5, 1e65], np.eye(2), False, 0, 1),
+        ([0.0, 0.0], np.eye(2), False, 0, 0),  # nothing measured
+    ],
+)
+def test_what_is_left_out_has_its_reason(z, S, guarded, left_out, invalid):
+    """Limited or guarded is not said of what is not a number, not positive definite, or beyond all sense."""
+    f = nb.filters.build("ekf", nb.systems.build("oscillator"), limiter=2.0)
+    info = UpdateInfo(*map(jnp.array, (z, S, -1.0, 0.0, guarded)))
+    total = added(nothing(1), Score(*(jnp.stack([each]) for each in score(f, info))))
+    assert (total.left_out[0], total.invalid[0]) == (left_out, invalid)
+    assert total.samples[0] == (left_out + invalid == 0 and any(z))
+    assert np.isfinite(total.nis[0])
+    assert np.isfinite(total.log_likelihood[0]) != (z[1] == 1e65)
 
 
 def simulated(problem, seed):

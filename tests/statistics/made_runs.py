@@ -36,6 +36,7 @@ class Runs(NamedTuple):
     samples: np.ndarray
     left_out: np.ndarray
     log_likelihood: np.ndarray
+    invalid: np.ndarray
 
 
 def layout(
@@ -88,6 +89,7 @@ def make(layout: Layout, runs: int, seed: int, lost: float = 0.02) -> Runs:
         samples=samples,
         left_out=rng.binomial(1, 0.1, (f, t, n)) * (np.arange(t) > 0)[:, None],
         log_likelihood=np.cumsum(np.where((np.arange(t) > 0)[:, None], gained, 0.0), axis=1),
+        invalid=rng.binomial(1, 0.05, (f, t, n)) * (np.arange(t) > 0)[:, None],
     )
     for field, bad in (("error", np.nan), ("variance", np.inf), ("third", -np.inf), ("cov", np.nan)):
         array = getattr(runs_made, field)

@@ -9,8 +9,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from nlbench.results.reasons import left_out
 from nlbench.statistics.chi_square import quantile
-from nlbench.statistics.consistency import COLUMNS, consistency_table
+from nlbench.statistics.consistency import COLUMNS, consistency_table, left_out_table
 from nlbench.statistics.summary import statistics_table
 from tests.statistics import made_runs
 
@@ -52,6 +53,7 @@ def made(filters, times, runs, left_out=0, factor=1.0):
         nees=factor * rng.chisquare(2, invented.nees.shape),
         nis=np.where(samples > 0, factor * rng.chisquare(np.maximum(3 * samples, 1)), 0.0),
         left_out=np.zeros_like(samples),
+        invalid=np.zeros_like(samples),
     )
     invented.left_out[0, 1, :left_out] = 1
     totals = made_runs.total(invented, layout)
@@ -91,6 +93,26 @@ def test_a_selection_of_samples_has_no_bounds():
     others = table.drop([("filter 1", "nis", time) for time in ("0.5", "all")])
     assert others.consistent.notna().all()
     assert others.low.notna().all()
+
+
+def test_what_is_left_out_is_counted_by_its_reason():
+    """Of the runs that are not lost at a time, and of those that never are; against a plain count."""
+    layout = made_runs.layout(filters=2, times=3)
+    invented = made_runs.make(layout, 300, seed=12)
+    table = left_out_table(made_runs.total(invented, layout)).set_index(["filter", "time"])
+    lost = made_runs.lost(invented, layout)
+    for f, label in enumerate(layout.filters):
+        for times, time in (([1], "0.5"), ([2], "1.0"), ([1, 2], "all")):
+            kept = ~(lost[f].any(0) if time == "all" else lost[f, times[0]])
+            for name, counted in (("limited_or_guarded", "left_out"), ("invalid", "invalid")):
+                expected = getattr(invented, counted)[f, times][:, kept].sum()
+                assert table.loc[(label, time), name] == expected > 0
+
+
+def test_limited_is_not_said_of_what_had_no_valid_covariance():
+    assert left_out({"limited_or_guarded": 0, "invalid": 340}) == "340 without a valid covariance"
+    both = {"limited_or_guarded": 12, "invalid": 3400}
+    assert left_out(both) == "12 limited or guarded and 3,400 without a valid covariance"
 
 
 def test_the_table_survives_both_formats(tmp_path):

@@ -89,6 +89,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say(runs):
         samples=np.zeros((1, 2001, runs), int),
         left_out=np.zeros((1, 2001, runs), int),
         log_likelihood=zeros[:, :, 0],
+        invalid=np.zeros((1, 2001, runs), int),
     )
     variance = b**2 + 2 * c**2
     truth = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import jax
 import numpy as np
 import pytest
 
@@ -254,3 +255,77 @@ def test_a_negative_predicted_variance_leaves_nothing_of_the_residual():
     S_z = Tensor.from_array(np.array([[-1.0, 0.0], [0.0, 4.0]]), ((0, 1),))
     clipped = limited(Tensor.from_array(np.array([3.0, 9.0])), S_z, 2.0)
     np.testing.assert_array_equal(np.asarray(clipped.to_array()), [0.0, 4.0])
+
+
+def letting_in(ratios, **options):
+    """Means and covariances of the integration update for priors so many times diag(1, 4) correlated, seen by three
+    sensors of variance .2 at once; and Kalman's."""
+    h, noise, prior = (
+        np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]),
+        0.2 * np.eye(3),
+        [[1.0, 1.2], [1.2, 4.0]],
+    )
+    f = nb.filters.build(
+        "integration-update", linear_measurement(np.zeros(2), np.eye(2), h, noise), **options
+    )
+    covs = np.multiply.outer(ratios, np.array(prior))
+    y = np.sqrt(ratios)[:, None] * [1.0, 2.0, 2.5]
+
+    def one(cov, y):
+        state, _ = f.update(f.init(nb.Moments(np.zeros(2), cov)), 0.0, y)
+        moments = f.moments(state)
+        return moments.mean, moments.cov
+
+    found = jax.jit(jax.vmap(one))(covs, y)
+    exact = [
+        kalman_update(np.zeros(2), *each)
+        for each in ((cov, h, noise, z) for cov, z in zip(covs, y, strict=True))
+    ]
+    return [np.asarray(part) for part in found], [np.stack(part) for part in zip(*exact, strict=True)]
+
+
+def relative_errors(found, exact):
+    """Of means in deviations, and of covariances in the largest ratio of variances in any direction less one."""
+    roots = np.linalg.inv(np.linalg.cholesky(exact[1]))
+    means = np.abs(np.einsum("kij,kj->ki", roots, found[0] - exact[0])).max(1)
+    covs = np.einsum("kia,kab,kjb->kij", roots, found[1] - exact[1], roots)
+    return means, np.abs(np.linalg.eigvalsh(covs)).max(1)
+
+
+def test_the_integration_update_is_kalmans_however_much_is_let_in():
+    """A linear measurement at the default steps: to 1e-5 up to an information of a million, and failed beyond it."""
+    information = 12.4 * 5.0  # tr(H P H' R^-1) of the prior once
+    ratios = np.array([1e-4, 1e-2, 0.1, 0.25, 1.0, 10.0, 1e3, 0.99e6 / information, 1.01e6 / information])
+    found, exact = letting_in(ratios)
+    means, covs = relative_errors([part[:-1] for part in found], [part[:-1] for part in exact])
+    assert means.max() < 1e-5
+    assert covs.max() < 1e-5
+    assert np.isnan(found[0][-1]).all()
+    assert np.isnan(found[1][-1]).all()
+
+
+@pytest.mark.parametrize("steps", [1, 5, 20])
+def test_equal_steps_that_are_too_long_fail_and_the_others_are_right_to_one_percent(steps):
+    found, exact = letting_in(np.geomspace(1e-3, 1e3, 61), steps=steps)
+    failed = np.isnan(found[1]).all((1, 2))
+    _, covs = relative_errors([part[~failed] for part in found], [part[~failed] for part in exact])
+    assert covs.max() < 0.01
+    assert 5 < failed.sum() < 61 - 5
+    assert np.isfinite(found[0][~failed]).all()
+
+
+def test_a_bend_that_is_too_strong_for_its_steps_fails():
+    """The two-step update of y = x + bend (x - 2)^2, which for a straight sensor is Kalman's in any number of steps."""
+
+    def variance(bend, steps):
+        system = nb.System(
+            lambda t, x: 0 * x,
+            lambda t, x: x + bend * (x - 2.0) ** 2,
+            np.array([[0.01]]),
+            nb.Moments([2.0], [[1.0]]),
+        )
+        return float(updated("two-step-2", system, np.array([1.0]), steps=steps)[0].cov[0, 0])
+
+    assert variance(0.0, 1) == pytest.approx(0.01 / 1.01, rel=1e-12)
+    assert variance(0.2, 10) == pytest.approx(variance(0.2, 400), rel=0.01)
+    assert np.isnan(variance(3.0, 1))
