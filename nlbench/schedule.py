@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+MOST_STEPS = 10**9  # of a run, or along recorded data
+
 
 class Schedule(NamedTuple):
     """A segment is the longest stretch of steps without a measurement or an output inside.

@@ -19,7 +19,7 @@ from nlbench.errors import ConfigError, Problem
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-NAME = re.compile(r"[a-z][a-z0-9]*([_-][a-z0-9]+)*")
+NAME = re.compile(r"[a-z][a-z0-9]*([_-][a-z0-9]+)*")  # of what becomes a function of Python
 BASELINE = "no-filter"  # what any filter should be better than
 # For each kind of system, (discrete, continuous): a simple filter, and one that should be better.
 COMPARED = {
@@ -55,8 +55,10 @@ def new(
 
     A system or filter becomes NAME.py, an experiment NAME.yaml. What is there already is never overwritten.
     """
-    if not NAME.fullmatch(name) or keyword.iskeyword(name):
-        raise ConfigError(f"'{name}': expected a name of a-z 0-9 _ - such as van_der_pol")
+    capitals = what is What.experiment
+    if not NAME.fullmatch(name.lower() if capitals else name) or keyword.iskeyword(name):
+        letters = "A-Z a-z" if capitals else "a-z"
+        raise ConfigError(f"'{name}': expected a name of {letters} 0-9 _ - such as van_der_pol")
     word, dashed = name.replace("-", "_"), name.replace("_", "-")
     if what is What.experiment:
         _experiment(Path(f"{word}.yaml"), dashed, system, filters or [])
@@ -74,7 +76,7 @@ def _experiment(path: Path, name: str, system: str, filters: list[str]) -> None:
     from nlbench import systems
     from nlbench.filters import catalogue
 
-    if name in NO_TEXT:
+    if name.lower() in NO_TEXT:
         raise ConfigError(f"'{name}': means something else in YAML; choose another name")
     kind = _kind(system)
     worse, better = _compared(kind, filters)
@@ -160,8 +162,9 @@ def _write(path: Path, skeleton: str, values: dict[str, str]) -> None:
     """Raises `ConfigError` where there is something already."""
     from nlbench.results.atomic import atomic_write
 
-    if path.exists() or path.is_symlink():
-        raise ConfigError(f"{path}: exists, and is not overwritten; choose another name or folder")
+    same = [each.name for each in Path().iterdir() if each.name.casefold() == path.name.casefold()]
+    if same:
+        raise ConfigError(f"{same[0]}: exists, and is not overwritten; choose another name or folder")
     text = _skeleton(skeleton)
     for placeholder, value in values.items():
         text = re.sub(rf"\b{placeholder}\b", value.replace("\\", r"\\"), text)

@@ -20,6 +20,7 @@ WITH = {
     "less_than": {"factor"},
     "printed": set(),
 }
+APART = {"id", "says", "whose", "where", "figures", "coordinate", "at"}  # what a form does not depend on
 COMPARING = ("factor", "within", *SINGLE)
 Moments = Annotated[dict[str, Finite], Field(min_length=1)]
 
@@ -72,19 +73,25 @@ class Claim(Section):
 
     @model_validator(mode="after")
     def _one_form(self) -> Claim:
+        if wrong := self.misfit():
+            raise ValueError(wrong)
+        return self
+
+    def misfit(self) -> str:
+        """Say what of the keys that compare cannot be combined; nothing where all can."""
         given = [key for key in FORMS if getattr(self, key) is not None]
         if len(given) != 1:
             told = " and ".join(given) or "none"
-            raise ValueError(f"expected exactly one of less, equal and of, found {told}")
+            return f"expected exactly one of less, equal and of, found {told}"
         if self.of is not None and all(getattr(self, key) is None for key in SINGLE):
-            raise ValueError(f"'of' needs one of {', '.join(SINGLE)}")
+            return f"'of' needs one of {', '.join(SINGLE)}"
         beside = {key for key in COMPARING if getattr(self, key) is not None} - {self.form}
         if unfit := sorted(beside - WITH[self.form]):
-            raise ValueError(f"'{unfit[0]}' does not go with '{self.form}'")
+            return f"'{unfit[0]}' does not go with '{self.form}'"
         if self.form in ("equal", "agrees_with") and self.within is None:
-            raise ValueError(f"'{self.form}' needs 'within', the largest relative difference")
+            return f"'{self.form}' needs 'within', the largest relative difference"
         if self.below is not None and self.above is not None and self.above >= self.below:
-            raise ValueError("'above' must be less than 'below'")
+            return "'above' must be less than 'below'"
         if self.statistic.startswith("moment_") != (self.printed is not None):
-            raise ValueError("'printed' goes with the statistics moment_estimated and moment_actual, only")
-        return self
+            return "'printed' goes with the statistics moment_estimated and moment_actual, only"
+        return ""

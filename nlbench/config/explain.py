@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import types
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -38,15 +38,47 @@ def validated(model: type[Model], raw: Any, at: Path = ()) -> tuple[Model | None
             Finding(at, f"expected a mapping ({', '.join(model.model_fields)}), found {found(raw)}")
         ]
     raw = plain(raw)
-    findings: list[Finding] = []
-    instance = None
-    try:
-        instance = model.model_validate_json(json.dumps(raw), strict=True)
-    except ValidationError as error:
-        findings += _findings(model, raw, error)
+    instance, findings = _parsed(model, raw)
+    unknown = [
+        each.path[0] for each in findings if each.at_key and len(each.path) == 1 and each.path[0] in raw
+    ]
+    if unknown and len(unknown) == len(findings):  # else nothing looks at fields together
+        findings += _parsed(model, {key: value for key, value in raw.items() if key not in unknown})[1]
     told = {each.path for each in findings}
     findings += [each for each in _extremes(raw, ()) if each.path not in told]
     return None if findings else instance, [each._replace(path=(*at, *each.path)) for each in findings]
+
+
+def _parsed(model: type[Model], raw: dict[str, Any]) -> tuple[Model | None, list[Finding]]:
+    try:
+        return model.model_validate_json(json.dumps(raw), strict=True), []
+    except ValidationError as error:
+        return None, list(_findings(model, raw, error))
+
+
+def sound(model: type[Model], raw: Any, findings: Iterable[Finding], at: Path = ()) -> Model:
+    """What of `raw`, placed at `at`, is right: an instance that may lack some of it.
+
+    None stands for every value that a finding is about or that is missing, entries of lists included.
+    """
+    raw = plain(raw) if isinstance(raw, dict) else {}
+    wrong = {each.path for each in findings}
+
+    def right(value: Any, path: Path) -> Any:
+        if path in wrong:
+            return None
+        if isinstance(value, list):
+            return [right(each, (*path, index)) for index, each in enumerate(value)]
+        return value
+
+    def default(field: Any) -> Any:
+        return None if field.is_required() else field.get_default(call_default_factory=True)
+
+    fields = {
+        key: right(raw[key], (*at, key)) if key in raw else default(field)
+        for key, field in model.model_fields.items()
+    }
+    return model.model_construct(**fields)
 
 
 def plain(value: Any) -> Any:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-STEM = re.compile(r"[a-z0-9][a-z0-9_.-]*")
+STEM = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -36,7 +36,7 @@ def _path_like(name: str) -> str:
     """A name that is safe as a folder below the results: no way out of it, and nothing hidden in it."""
     safe = all(STEM.fullmatch(part) and not part.endswith(".") for part in name.split("/"))
     if not safe or len(name) > 100:
-        allowed = "parts of a-z 0-9 - _ . with / between them"
+        allowed = "parts of A-Z a-z 0-9 - _ . with / between them"
         raise ValueError(f"expected a name such as 'culver/hermite-01' ({allowed}), found {name[:60]!r}")
     return name
 

@@ -29,11 +29,12 @@ def load(
     every problem of keys, values, names and their consistency, each with its place in the file or option.
     """
     document = documents.read(path)
-    settings.apply(document, [settings.parse(each) if isinstance(each, str) else each for each in overrides])
+    problems = settings.apply(document, overrides)
     with plugged.standing_in(document.data if recorded else {}):
         experiment, findings = assemble(document.data, document.question)
-    if experiment is None:
-        raise _sorted([document.problem(each.path, each.message, each.at_key) for each in findings])
+    problems += [document.problem(each.path, each.message, each.at_key) for each in findings]
+    if problems or experiment is None:
+        raise _sorted(problems)
     try:
         check(experiment)
     except ConfigError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from nlbench.config.document import value_of
@@ -32,10 +33,15 @@ def parse(text: str) -> Override:
     return Override(key, value, f"--set {key if len(key) <= LONGEST_KEY else key[:LONGEST_KEY] + ' ...'}")
 
 
-def apply(document: Document, overrides: list[Override]) -> None:
-    """Put each value into the document's data. Raises `ConfigError` with all that cannot be put there."""
+def apply(document: Document, overrides: Sequence[str | Override]) -> list[Problem]:
+    """Put each value into the document's data; what cannot be put there is returned, each with its option."""
     problems: list[Problem] = []
-    for override in overrides:
+    for each in overrides:
+        try:
+            override = parse(each) if isinstance(each, str) else each
+        except ConfigError as error:
+            problems += error.problems
+            continue
         path = tuple(_part(part) for part in re.split(r"[.\[]", override.key))
         place = Place(override.option)
         if len(path) > DEEPEST:
@@ -50,8 +56,7 @@ def apply(document: Document, overrides: list[Override]) -> None:
             problems.append(place.problem(path, str(error.args[0])))
         else:
             _mark(document, path, place)
-    if problems:
-        raise ConfigError(problems)
+    return problems
 
 
 def _part(text: str) -> str | int:

@@ -39,6 +39,20 @@ def broken(name: str, parameters: dict[str, Any]) -> list[str]:
     return []
 
 
+def interval(name: str, parameters: dict[str, Any]) -> float | None:
+    """The time between the measurements that a system makes; None where it makes none at fixed times.
+
+    A system of a plug-in is made to see, where code may run. Raises `ConfigError` where it cannot be made.
+    """
+    from nlbench import systems
+
+    found = plugins.find("systems", name)
+    if name not in systems.MODULES and found is not None and found[1].kind is None:
+        made = systems.build(name, **parameters)
+        return (made.truth or made).interval
+    return None if parameters.get("measurement") in ("none", "continuous") else parameters.get("interval")
+
+
 def used(
     system: SystemSpec | None, filters: Sequence[FilterSpec | None], given: Any
 ) -> tuple[list[PluginSpec], list[Finding]]:
@@ -65,18 +79,22 @@ def used(
     for name in dict.fromkeys(spec.name for spec in filters if spec):
         if name not in FILTERS:
             noted("filters", name)["filters"].append(name)
-    return [PluginSpec(**spec) for spec in specs.values()], _absent(given, specs)
+    known = system is not None and None not in filters
+    return [PluginSpec(**spec) for spec in specs.values()], _absent(given, specs, known)
 
 
-def _absent(given: Any, at_hand: dict[str, Any]) -> list[Finding]:
-    """Findings of the key `plugins`: not what a run writes, or with other code than what is at hand."""
+def _absent(given: Any, at_hand: dict[str, Any], known: bool) -> list[Finding]:
+    """Findings of the key `plugins`: not what a run writes, or with other code than what is at hand.
+
+    known: whether all that the experiment uses is; otherwise what is at hand may lack some.
+    """
     findings: list[Finding] = []
     if given is not None and not isinstance(given, list):
         return [Finding(("plugins",), "filled in by a run; plug-ins are allowed with --plugin FILE.py")]
     for index, each in enumerate(given or []):
         spec, wrong = validated(PluginSpec, each, ("plugins", index))
         findings += wrong
-        if spec and spec.digest not in at_hand:
+        if spec and known and spec.digest not in at_hand:
             message = (
                 f"made with other code of {spec.file} than is at hand; to run today's, leave the key out"
             )

@@ -21,7 +21,7 @@ from nlbench.config.fields import (
     RunNumber,
     Section,
 )
-from nlbench.config.identity import canonical_hash, to_yaml
+from nlbench.config.identity import canonical_hash, named_folder, to_yaml
 
 LARGEST = 2**63 - 1
 # Sections that say how results are read and shown, not what is computed.
@@ -58,7 +58,7 @@ class Head(Section):
     report_times: list[Positive] | None = Field(
         default=None,
         min_length=1,
-        description="where claims, medians and kept runs are taken; default: the end",
+        description="where claims, medians and kept runs are taken; default: the end, and the times that claims name",
     )
     figures: list[Figure] | None = Field(
         default=None,
@@ -280,8 +280,11 @@ class Experiment(Section):
         return canonical_hash({key: value for key, value in plain.items() if key not in READ})
 
     def folder(self, out: str | Path) -> Path:
-        """Where its results lie below `out`."""
-        return Path(out) / self.experiment / self.hash12()
+        """Return where its results lie below `out`.
+
+        Raises `ConfigError` where those of another experiment do, whose name differs in capitals only.
+        """
+        return named_folder(Path(out), self.experiment) / self.hash12()
 
     def of_runs(self, runs: int) -> Experiment:
         """The same with so many runs."""

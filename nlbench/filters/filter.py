@@ -42,6 +42,7 @@ class Filter(NamedTuple):
     history: (state, times (T,)) -> Components (T,): the moments at earlier times, for a filter that remembers all it
         needs and computes them dearly; the engine then asks for them once, at the end. None for the others.
     limiter: how many standard deviations its residuals are clipped at; None if they are not.
+    step: the longest step of its predictions, 1 where time is discrete; None means a tenth of each way.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Filter(NamedTuple):
     angle: Callable | None = None
     history: Callable | None = None
     limiter: float | None = None
+    step: float | None = None
 
 
 def central_angle(system: System, mean: Tensor) -> Any:

@@ -139,15 +139,25 @@ def _register(plugin: Plugin) -> None:
 def _clashes(
     plugin: Plugin, others: Sequence[Plugin], taken: Mapping[Kind, Collection[str]]
 ) -> Iterator[Problem]:
-    """What is wrong with the names of a plug-in: those that are not free. The same code twice is one plug-in."""
+    """What is wrong with the names of a plug-in: those that are not free, whatever their capitals.
+
+    The same code twice is one plug-in.
+    """
     others = [other for other in others if other.digest != plugin.digest and other.path != plugin.path]
     for kind in taken:
+        holders = {name.casefold(): (name, "a built-in name; choose another") for name in taken[kind]}
+        for name in installed.names(kind):
+            holders.setdefault(
+                name.casefold(), (name, "already that of an installed package; choose another")
+            )
+        for other in others:
+            holders |= {
+                name.casefold(): (name, f"already that of {other.path}") for name in other.entries(kind)
+            }
         for name in plugin.entries(kind):
-            of = next((other.path for other in others if name in other.entries(kind)), None)
-            if name in taken[kind]:
-                yield Problem(f"{kind}: '{name}' is a built-in name; choose another", file=plugin.path)
-            elif of is not None:
-                yield Problem(f"{kind}: '{name}' is already that of {of}", file=plugin.path)
-            elif name in installed.names(kind):
-                message = f"{kind}: '{name}' is already that of an installed package; choose another"
+            known, why = holders.setdefault(name.casefold(), (name, ""))
+            if known != name:
+                message = f"{kind}: '{name}' differs in capitals only from '{known}'; choose another"
                 yield Problem(message, file=plugin.path)
+            elif why:
+                yield Problem(f"{kind}: '{name}' is {why}", file=plugin.path)

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from nlbench import runtime
+from nlbench.blame import locate_step
 from nlbench.errors import ConfigError, Problem
-from nlbench.plugins import trouble
 from nlbench.plugins.plugin import Entry, Kind, Plugin
 from nlbench.plugins.signature import entry_of
 from nlbench.suggestions import suggestion
 
-NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9-]*")
 DECLARATIONS: dict[str, Kind] = {"SYSTEMS": "systems", "FILTERS": "filters"}
 EXAMPLE = {
     "SYSTEMS": 'SYSTEMS = {"van-der-pol": van_der_pol}',
@@ -52,7 +52,7 @@ def executed(text: str, path: str) -> Plugin:
         exec(compile(text, path, "exec", dont_inherit=True), module.__dict__)
     except (Exception, SystemExit) as error:
         del sys.modules[module.__name__]
-        raise ConfigError([trouble.located(error, path, "importing it failed")]) from None
+        raise ConfigError([locate_step(error, path, "importing it failed")]) from None
     systems, filters = declared(module, path)
     return Plugin(Path(path).name, digest, path, text, systems, filters)
 
@@ -93,6 +93,6 @@ def declared(module: Any, path: str) -> tuple[dict[str, Entry], dict[str, Entry]
 
 def _named(name: Any, declaration: str, path: str) -> str:
     if not isinstance(name, str) or not NAME.fullmatch(name):
-        message = f"{declaration}: expected a name of a-z 0-9 - such as 'van-der-pol', found {name!r}"
+        message = f"{declaration}: expected a name of a-z 0-9 - or A-Z, such as 'van-der-pol', found {name!r}"
         raise ConfigError([Problem(message, file=path)])
     return name

@@ -172,7 +172,8 @@ def test_a_filter_that_is_lost_fails_with_four_and_its_first_line(tmp_path):
     done = invoke(config, recorded(tmp_path, [0.1, 0.2, 3.0, 3.1], [1.0, 1e5, 1.0, 1.0]), "--json")
     assert done.exit_code == 4
     assert all(each["verdict"] == "FAILED" for each in json.loads(done.stdout)["filters"])
-    assert f"FAILED: ekf: no finite estimate from {tmp_path}/data.csv:4 on" in done.stderr
+    said = f"FAILED: ekf: no finite estimate from {tmp_path}/data.csv:4 on; first in the propagation: "
+    assert f"{said}the mean and covariance are not finite" in done.stderr
 
 
 def test_everything_wrong_with_both_files_is_said_at_once_and_nothing_is_written(tmp_path):
@@ -207,6 +208,9 @@ def test_a_start_that_does_not_fit_hides_no_option_that_does_not(tmp_path, monke
         (SCALAR, "time,a\n1,1\n", ["--start", "nan"], "--start: expected a finite number"),
         (SCALAR, "time,a\n1,1\n", ["--start", "2"], "data.csv:2: time: 1.0 comes before the start, 2.0"),
         (SCALAR, "time,a\n1e12,1\n", [], "data.csv: 1e+14 steps of 0.01"),
+        (SCALAR, "time,a\n1.7e9,1\n", [], "1,000,000,000; --start 1700000000 starts at the first row; a longer --set"),
+        (SCALAR, "time,a\n1.7e12,1\n1700000000100,1\n", [], "are times in milliseconds? Then divide them by 1000; --"),
+        (STEPS, "time,a\n1700000000,1\n", [], "steps of 1 from the start, 0, to the last row, more than 1,000,000,000"),
         (SCALAR, "time,a\n1,1\n", ["--filter", "efk"], "--filter: no filter is labelled 'efk'; did you mean 'ekf'?"),
         (SCALAR, "time,a\n1,1\n", ["--out", "."], "--out: . is a folder"),
         (SCALAR, "time,a\n1,1\n", ["--out", "data.csv"], "--out: would overwrite data.csv, which is read"),
@@ -243,6 +247,41 @@ def test_a_full_disk_leaves_no_part_of_a_file(tmp_path, monkeypatch):
     assert done.exit_code == 5
     assert "No space left" in done.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["data.csv", "fig.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("times", "says"),
+    [
+        (
+            [170.0, 170.1],
+            "predicted from 0 over 17,000 steps of 0.01 before the first row, at 170; --start 170 starts",
+        ),
+        (
+            [100.0, 200.0],
+            "rows are 100 apart and the system is measured every 0.1: are times in milliseconds?",
+        ),
+    ],
+)
+def test_a_log_that_starts_late_or_is_in_milliseconds_is_said_on_stderr_and_in_json(tmp_path, times, says):
+    config, data = written(tmp_path, SCALAR), recorded(tmp_path, times, [1.0, 1.1])
+    done = invoke(config, data)
+    (line,) = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
+    assert line.startswith(f"warning: {data}: {says}")
+    assert len(estimates(done)) == 2
+    quiet = invoke(config, data, "--json")
+    assert quiet.stderr == ""
+    assert json.loads(quiet.stdout)["warning"].startswith(f"{data}: {says}")
+    if "--start" in says:
+        begun = invoke(config, data, "--json", "--start", "170")
+        assert json.loads(begun.stdout)["warning"] is None
+
+
+def test_every_option_that_cannot_be_meant_is_said_at_once(tmp_path):
+    config, data = written(tmp_path, SCALAR), recorded(tmp_path, [1.0], [1.0])
+    done = invoke(config, data, "--out", tmp_path, "--start", "2", "--filter", "efk")
+    assert done.exit_code == 2
+    for says in ("--out: ", "comes before the start, 2.0", "no filter is labelled 'efk'"):
+        assert says in done.stderr
 
 
 def test_the_exact_reference_runs_along_and_believes_in_what_makes_the_data(tmp_path):

@@ -46,7 +46,7 @@ def test_times_that_are_not_whole_steps_are_refused_all_at_once():
         system={"name": "own", "time": "discrete", "interval": 2.5},
         time={"end": 10.5, "output": 1.5, "step": 0.5},
     )
-    assert set(found) == {"time.step", "time.output", "system.interval"}
+    assert set(found) == {"time.step", "time.output", "time.end", "system.interval"}
     assert "a step is 1, found 0.5" in found["time.step"]
 
 

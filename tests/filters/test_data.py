@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -143,6 +145,26 @@ def test_what_is_no_fair_sample_of_nis_is_marked():
     assert clipped[3]
     assert not clipped[2]
     assert followed.taken.tolist() == [2, 1, 0, 2, 2]
+    assert not followed.invalid.any()
+    assert not followed.wrong.any()
+
+
+def test_limited_is_not_said_of_what_is_not_a_number():
+    """A root that is infinitely steep where the filter starts: the first update leaves nothing finite."""
+    system = nb.System(
+        lambda t, x: 0 * x,
+        lambda t, x: jnp.sqrt(jnp.abs(x)),
+        [[0.1]],
+        nb.Moments([1.0], [[1.0]]),
+        interval=1.0,
+    )
+    f = nb.filters.build("second-order", system, limiter=1.0)  # refused at 0
+    f = f._replace(system=replace(system, initial=nb.Moments([0.0], [[1.0]])))
+    followed = data.follow(f, np.arange(3.0), [np.nan, 1.0, 1.0])
+    assert followed.invalid.tolist() == [False, True, True]
+    assert not followed.altered.any()
+    assert followed.wrong[:, 1].tolist() == [[False, False], [True, True], [True, True]]  # after the update
+    assert followed.wrong[:2, 0].tolist() == [[False, False], [False, False]]  # after the propagation
 
 
 def test_ten_thousand_rows_take_one_compilation():
