@@ -48,7 +48,8 @@ def build(
         clock = Clock.of_steps(lambda state, k: step(motion, k, state))
     else:
         clock = Clock.of_integrals(
-            propagator(approximated(local, system), options.propagation), options.step or system.default_step
+            propagator(approximated(local, system), getattr(options, "propagation", "transition")),
+            options.step or system.default_step,
         )
 
     def slope(state: Spread, t: Any) -> Gaussian:

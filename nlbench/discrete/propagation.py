@@ -8,9 +8,9 @@ accurate measurement. So over a step h the columns are carried instead, L of the
 nodes s_j with weights b_j on (0, h),
   (2) L' = F L,  X_j' = F X_j from X_j(s_j) = g_j,  P(h) = L L' + h sum b_j X_j X_j'
 which is positive semidefinite whatever F is, and on linear systems Phi P Phi' + Q with Phi of the same Runge-Kutta
-steps. What (2) looks up between the ends of the step, mean and L, is their cubic through both ends and slopes, and F
-the parabola through the nodes: of fourth order in h, like the steps themselves. Where f, F and g depend on P, the noise
-since the start of the step enters P as s g g', which is of second order.
+steps. What (2) looks up within the step, mean and L, follows from its stages, and F is the parabola through the nodes:
+the whole is of fourth order in h, like the steps. Where f, F and g depend on P, the noise since the start of the step
+enters P as s g g', which is of second order.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 
 from nlbench.discrete.correction import Gaussian, Spread
 from nlbench.discrete.roots import absolute_root, nonnegative_root, triangular
-from nlbench.moments.integrate import StagedRK4, fixed_rk4
+from nlbench.moments.integrate import fixed_rk4
 
 NODES = (1 + np.polynomial.legendre.leggauss(3)[0]) / 2  # of (0, 1)
 WEIGHTS = np.polynomial.legendre.leggauss(3)[1] / 2
@@ -61,44 +61,51 @@ def moment_rates(local: Approximation, t: Any, at: Gaussian, root: Any) -> Gauss
 
 def carried(local: Approximation, t: Any, h: Any, mean: Any, columns: Any) -> Carried:
     """(2), for L = columns (n, p); the unit matrix gives Phi, where the approximation does not depend on P."""
-    local = jax.jit(local)
-    g0 = local(t, mean, columns).g
+    local = jax.jit(local)  # traced once
+    first = local(t, mean, columns)
 
-    def around(s: Any, L: Any) -> Any:
-        return L if g0 is None else jnp.concatenate([L, jnp.sqrt(jnp.maximum(s, 0.0)) * g0], 1)
+    def at(c: Any, y: tuple[Any, Any]) -> Local:
+        m, L = y
+        noise = [] if first.g is None else [jnp.sqrt(c * h) * first.g]
+        return local(t + c * h, m, jnp.concatenate([L, *noise], 1))
 
-    def rates(s: Any, y: tuple[Any, Any]) -> tuple[Any, Any]:
-        f, F, _ = local(t + s, y[0], around(s, y[1]))
+    def slope(c: float, y: tuple[Any, Any]) -> tuple[Any, Any]:
+        f, F, _ = first if c == 0 else at(c, y)
         return f, F @ y[1]
 
     start = (mean, columns)
-    end: tuple[Any, Any] = StagedRK4().advance(rates, 0.0, h, start)
-    if g0 is None:
-        return Carried(*end, jnp.zeros((len(mean), 0)))
-    slopes = rates(0.0 * h, start), rates(h, end)
-
-    def between(c: Any) -> Local:
-        weights = (1 + 2 * c) * (1 - c) ** 2, c**2 * (3 - 2 * c), h * c * (1 - c) ** 2, h * c**2 * (c - 1)
-        m, L = (sum(w * part for w, part in zip(weights, parts, strict=True))
-                for parts in zip(start, end, *slopes, strict=True))  # fmt: skip
-        return local(t + c * h, m, around(c * h, L))
-
-    nodes = jax.vmap(between)(jnp.asarray(NODES))
+    stages = _stages(slope, h, start)
+    mean, columns = _between(1.0, h, start, stages)
+    if first.g is None:
+        return Carried(mean, columns, jnp.zeros((len(mean), 0)))
+    nodes = jax.vmap(lambda c: at(c, _between(c, h, start, stages)))(jnp.asarray(NODES))
     noise = [np.sqrt(WEIGHTS[j]) * _to_the_end(nodes.F, h, j, nodes.g[j]) for j in range(len(NODES))]
-    return Carried(*end, jnp.sqrt(h) * jnp.concatenate(noise, 1))
+    return Carried(mean, columns, jnp.sqrt(h) * jnp.concatenate(noise, 1))
+
+
+def _stages(slope: Callable[[float, Any], Any], h: Any, y: Any) -> list[Any]:
+    """The four slopes of a step of the classical Runge-Kutta method; slope: (share of the step, y) -> dy/dt."""
+    stages: list[Any] = []
+    for c in (0.0, 0.5, 0.5, 1.0):
+        ahead = y if not stages else jax.tree.map(lambda y, k, c=c: y + c * h * k, y, stages[-1])
+        stages.append(slope(c, ahead))
+    return stages
+
+
+def _between(c: Any, h: Any, y: Any, stages: list[Any]) -> Any:
+    """y at a share c of the step, to third order within it (Hairer, Norsett and Wanner 1993, II.6)."""
+    inner = c**2 - 2 * c**3 / 3
+    weights = c - 3 * c**2 / 2 + 2 * c**3 / 3, inner, inner, 2 * c**3 / 3 - c**2 / 2
+    return jax.tree.map(
+        lambda y, *k: y + h * sum(w * each for w, each in zip(weights, k, strict=True)), y, *stages
+    )
 
 
 def _to_the_end(F: Any, h: Any, j: int, X: Any) -> Any:
     """X' = F X from node j to the end of the step, F (3, n, n) known at the nodes, by one Runge-Kutta step."""
     start, length = NODES[j], 1 - NODES[j]
-    at = [_parabola(start + part * length) for part in (0.0, 0.5, 1.0)]
-    F0, F1, F2 = (jnp.tensordot(each, F, 1) for each in at)
-    h = length * h
-    k1 = F0 @ X
-    k2 = F1 @ (X + h / 2 * k1)
-    k3 = F1 @ (X + h / 2 * k2)
-    k4 = F2 @ (X + h * k3)
-    return X + h / 6 * (k1 + 2 * (k2 + k3) + k4)
+    slope = lambda c, X: jnp.tensordot(_parabola(start + c * length), F, 1) @ X  # noqa: E731
+    return _between(1.0, length * h, X, _stages(slope, length * h, X))
 
 
 def _parabola(c: float) -> np.ndarray:

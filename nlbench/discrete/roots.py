@@ -28,11 +28,11 @@ def triangular(columns: Any) -> Any:
     least = (r + c) * jnp.finfo(columns.dtype).eps * jnp.sqrt(jnp.sum(columns**2, 1))
     rest, found = columns, []
     for j in range(r):
-        length = jnp.sqrt(jnp.sum(rest[j] ** 2))
+        length = jnp.sqrt(jnp.sum(rest[0] ** 2))
         nil = length <= least[j]
-        direction = jnp.where(nil, 0.0, rest[j] / jnp.where(nil, 1.0, length))
-        along = jnp.sum(rest[j:] * direction, 1)
-        rest = rest.at[j:].add(-along[:, None] * direction)
+        direction = jnp.where(nil, 0.0, rest[0] / jnp.where(nil, 1.0, length))
+        along = jnp.sum(rest * direction, 1)
+        rest = rest[1:] - along[1:, None] * direction
         found.append(jnp.concatenate([jnp.zeros(j, columns.dtype), along]))
     return jnp.stack(found, 1)
 

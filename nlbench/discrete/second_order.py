@@ -7,7 +7,6 @@ h_j(k, x, v), all at the estimate and w = v = 0, X the covariance of w and T tha
 `sof` (Athans): c = c' = 0, so the bias that (1) and (2) take out adds nothing to the covariance. `sof-gaussian`: for
 x - m and the noise independent and Gaussian, exact where f and h are quadratic,
   (3) c_ij = tr(F_i P F_j P)/2 + tr(G_i X G_j X)/2 + tr(N_i X N_j' P),  c' likewise of M, Q, R
-which, with roots P = L L' and X = B B', are outer products of the columns L'F_i L/sqrt 2, B'G_i B/sqrt 2 and L'N_i B.
 In continuous time, with the drift's Hessian f_xx and G(t, x) dw, for `propagation`:
   (4) dm = f + f_xx:P/2,  dP = F P + P F' + G V G' + c
 with c = 0 (`sof`) or c_iq = P_pt V_jl G_ij,p G_ql,t, what (3) becomes for short steps (`sof-gaussian`).
@@ -16,13 +15,12 @@ Cost O(n^4). Fails when the third derivatives matter within a standard deviation
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
 
-from nlbench.discrete.correction import Spread, conditioned, factor, joint
+from nlbench.discrete.correction import Spread, conditioned, factor, joint, symmetric
 from nlbench.discrete.expansion import Second, curvature, drift, first, second
 from nlbench.discrete.problem import density_root, noise_columns
 from nlbench.discrete.propagation import Local
@@ -38,7 +36,7 @@ def step(whole: bool, motion: Noisy, k: Any, prior: Spread) -> Spread:
     """(1); whole: with (3)."""
     s, L, B = len(motion.cov), prior.root, square_root(motion.cov)
     f, hessians = first(motion.function, k, prior.mean, s), second(motion.function, k, prior.mean, s)
-    noise = _noise(whole, f.w @ B, hessians, L, B)
+    noise = _noise(whole, f.w @ B, hessians, prior.cov, motion.cov)
     return Spread(f.value + _bias(hessians, prior.cov, motion.cov), factor(f.x @ L, noise))
 
 
@@ -60,7 +58,7 @@ def update(whole: bool, seen: Observation, t: Any, prior: Spread, y: Any) -> tup
     q, L, B = len(seen.cov), prior.root, square_root(seen.cov)
     h, hessians = first(seen.function, t, prior.mean, q), second(seen.function, t, prior.mean, q)
     z = seen.innovation(y, h.value + _bias(hessians, prior.cov, seen.cov))
-    noise = _noise(whole, h.w @ B, hessians, L, B)
+    noise = _noise(whole, h.w @ B, hessians, prior.cov, seen.cov)
     return conditioned(prior, joint(seen, y, z, noise, h.x @ L, L), seen.limiter)
 
 
@@ -69,12 +67,11 @@ def _bias(hessians: Second, P: Any, X: Any) -> Any:
     return (jnp.einsum("iab,ab->i", hessians.xx, P) + jnp.einsum("ipq,pq->i", hessians.ww, X)) / 2
 
 
-def _noise(whole: bool, linear: Any, hessians: Second, L: Any, B: Any) -> Any:
-    """The columns that are independent of x - m: those of the noise, and with `whole` those of (3)."""
+def _noise(whole: bool, linear: Any, hessians: Second, P: Any, X: Any) -> Any:
+    """The columns that are independent of x - m: those of the noise, and with `whole` a root of (3)."""
     if not whole:
         return linear
-    squares = [
-        jnp.einsum("iab,aj,bk->ijk", H, X, X) / math.sqrt(2) for H, X in ((hessians.xx, L), (hessians.ww, B))
-    ]
-    cross = jnp.einsum("iap,aj,pk->ijk", hessians.xw, L, B)
-    return jnp.concatenate([linear, *(each.reshape(len(linear), -1) for each in (*squares, cross))], 1)
+    FP, GX = hessians.xx @ P, hessians.ww @ X
+    cross = jnp.einsum("iap,pq,jbq,ab->ij", hessians.xw, X, hessians.xw, P)
+    c = jnp.einsum("iab,jba->ij", FP, FP) / 2 + jnp.einsum("ipq,jqp->ij", GX, GX) / 2 + cross
+    return jnp.concatenate([linear, square_root(symmetric(c))], 1)
