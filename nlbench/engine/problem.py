@@ -191,6 +191,8 @@ def _fitting(
     problems, initial, options = Problems(), model.initial, {**spec.options, "missing": False}
     with problems.of(at):
         initial = overridden(model.initial, experiment.initial, spec.initial, at)
+    if experiment.initial or spec.initial:
+        model = replace(model, initial=initial)
     if kind(model).continuous:
         with problems.of(at):
             options["step"] = _only_step(spec, times)

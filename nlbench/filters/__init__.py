@@ -20,10 +20,12 @@ def build(name: str, system: System | DiscreteSystem, **options: Any) -> Filter:
 
     options: those of `nlbench.filters.options(name, discrete, continuous)` for a system of that kind.
     Raises `ConfigError` for an unknown name or option, where the filter does not apply to the system,
-    and where what the system's functions return has the wrong shape.
+    where what the system's functions return has the wrong shape, and where they are not finite, or a
+    derivative that the filter takes is not, at its start.
     """
     from nlbench.checks import checked, known
     from nlbench.errors import ConfigError
+    from nlbench.filters.derivatives import refuse_singular
     from nlbench.runtime import ensure_precision
     from nlbench.systems.system import kind
 
@@ -38,20 +40,20 @@ def build(name: str, system: System | DiscreteSystem, **options: Any) -> Filter:
     if found.family == "reference":
         from nlbench.references import build as build_reference
 
-        return build_reference(system)
-    return _builder(found.family)(name, found, system, chosen)
+        bound = build_reference(system)
+    else:
+        bound = _builder(found.family)(name, found, system, chosen)
+    step = 1.0 if of.discrete else getattr(chosen, "step", None) or getattr(system, "default_step", None)
+    bound = bound._replace(step=step)
+    refuse_singular(name, found, chosen, bound)
+    return bound
 
 
 def check(system: System | DiscreteSystem) -> None:
     """Raises `ConfigError` with a line for each shape in a system that does not fit, got and expected."""
-    from nlbench.discrete import shapes as in_steps
     from nlbench.filters import rules, shapes
-    from nlbench.systems.discrete import DiscreteSystem
 
-    if isinstance(system, DiscreteSystem):
-        in_steps.check_shapes(system)
-    else:
-        shapes.check_shapes(system)
+    shapes.check_shapes(system)
     rules.check_rules(system)
 
 

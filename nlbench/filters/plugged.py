@@ -9,7 +9,8 @@ import jax
 import jax.numpy as jnp
 
 from nlbench import plugins
-from nlbench.errors import ConfigError, Problem, said
+from nlbench.blame import explain
+from nlbench.errors import ConfigError, Problem
 from nlbench.filters.filter import Filter, UpdateInfo
 from nlbench.systems.discrete import DiscreteSystem
 from nlbench.systems.system import System
@@ -25,15 +26,18 @@ def build(name: str, row: Row, system: System | DiscreteSystem, options: Any) ->
     plugin, entry = found
     made = plugins.made(plugin, f"filter '{name}'", entry, system, options)
     if not isinstance(made, Filter):
-        wrong = [f"made a {type(made).__name__}, expected a nlbench.filters.filter.Filter"]
+        wrong: list[str | Problem] = [
+            f"made a {type(made).__name__}, expected a nlbench.filters.filter.Filter"
+        ]
     else:
         wrong = list(misfits(made, system))
     if wrong:
-        raise ConfigError([Problem(f"filter '{name}': {each}", file=plugin.path) for each in wrong])
+        problems = [each if isinstance(each, Problem) else Problem(each, file=plugin.path) for each in wrong]
+        raise ConfigError([each._replace(message=f"filter '{name}': {each.message}") for each in problems])
     return made
 
 
-def misfits(made: Filter, system: System | DiscreteSystem) -> Iterator[str]:
+def misfits(made: Filter, system: System | DiscreteSystem) -> Iterator[str | Problem]:
     """What is wrong with what the functions of a filter return for a system: a line for each, got and expected."""
     n, m, own = system.states, system.measurements, made.system
     if not isinstance(own, (System, DiscreteSystem)) or (own.states, own.measurements) != (n, m):
@@ -53,11 +57,14 @@ def misfits(made: Filter, system: System | DiscreteSystem) -> Iterator[str]:
         if sightings:
             yield from _angle(made, state)
     except _Raised as error:
-        yield str(error)
+        yield error.problem
 
 
 class _Raised(Exception):
     """A function of the filter raised; the others cannot be judged without its result."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
 
 
 def _shapes(name: str, function: Callable, *arguments: Any) -> Any:
@@ -65,7 +72,7 @@ def _shapes(name: str, function: Callable, *arguments: Any) -> Any:
     try:
         return jax.eval_shape(function, *arguments)
     except Exception as error:
-        raise _Raised(f"{name}: raises {type(error).__name__}{said(error)}") from None
+        raise _Raised(explain(error, name)) from None
 
 
 def _same(name: str, state: Any, expected: Any) -> Iterator[str]:

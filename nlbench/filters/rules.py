@@ -9,8 +9,10 @@ import jax
 import numpy as np
 
 from nlbench.errors import ConfigError, Problem
+from nlbench.filters.called import returned
+from nlbench.filters.constants import find_single
 from nlbench.names import of_file
-from nlbench.shapes import returned
+from nlbench.shapes import refuse_indefinite
 from nlbench.systems.system import Coordinate, Sets, state_names
 
 if TYPE_CHECKING:
@@ -28,11 +30,12 @@ def check_rules(system: System | DiscreteSystem) -> None:
     found = [*_errors(system), *_named(system), *_measured(system), *_sampled(system)]
     if system.interval is not None and not system.interval > 0:
         found.append(f"interval: got {system.interval!r}, expected a number above 0, or None")
+    found = found or list(find_single(system))
     if found:
-        raise ConfigError([Problem(each) for each in found])
+        raise ConfigError([Problem(each) if isinstance(each, str) else each for each in found])
 
 
-def _errors(system: System | DiscreteSystem) -> Iterator[str]:
+def _errors(system: System | DiscreteSystem) -> Iterator[str | Problem]:
     """Coordinates, errors, and what is made of them."""
     n = system.states
     odd = _odd(system)
@@ -46,9 +49,9 @@ def _errors(system: System | DiscreteSystem) -> Iterator[str]:
             return
     else:
         truth = system.states if system.truth is None else system.truth.states
-        yield from returned("error(x, m)", system.error, (truth, n), (c,))
+        yield from returned("error(x, m)", system.error, ((truth,), (n,)), (c,))
     if system.diverged is not None:
-        yield from returned("diverged(error)", system.diverged, (c,), ())
+        yield from returned("diverged(error)", system.diverged, ((c,),), ())
     if system.clip is not None and len(system.clip) != c:
         yield f"clip: got {len(system.clip)} bounds, expected {c}, one for each coordinate"
     members = [(f"norms[{name!r}]", chosen) for name, chosen in system.norms.items()]
@@ -102,22 +105,21 @@ def _clash(name: str, names: Sequence[str], before: Sequence[str]) -> str:
     return f"gives figures the same files as '{same[0]}' (letters, digits and _ . - count)" if same else ""
 
 
-def _measured(system: System | DiscreteSystem) -> Iterator[str]:
+def _measured(system: System | DiscreteSystem) -> Iterator[str | Problem]:
     if system.residual is not None:
         m = system.measurements
-        yield from returned("residual(y, h)", system.residual, (m, m), (m,))
+        yield from returned("residual(y, h)", system.residual, ((m,), (m,)), (m,))
     for name in ("initial.cov", "measurement_cov", "process_cov", "diffusion_cov"):
         owner = system.initial if name.startswith("initial") else system
         matrix = getattr(owner, name.split(".")[-1], None)
-        if matrix is None or isinstance(
-            matrix, jax.core.Tracer
-        ):  # a system made while jax traces has no numbers yet
-            continue
-        if not np.allclose(matrix, np.transpose(matrix)):
-            yield f"{name}: is not symmetric"
+        if matrix is not None:
+            yield from refuse_indefinite(name, matrix)
+    mean = system.initial.mean
+    if not isinstance(mean, jax.core.Tracer) and not np.isfinite(np.asarray(mean, float)).all():
+        yield f"initial.mean: got {np.asarray(mean)}, expected finite numbers"
 
 
-def _sampled(system: System | DiscreteSystem) -> Iterator[str]:
+def _sampled(system: System | DiscreteSystem) -> Iterator[str | Problem]:
     n = system.states
     if isinstance(system.sample, Sets):
         size = system.sample.size

@@ -10,8 +10,8 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
 from nlbench import runtime
+from nlbench.blame import locate_step
 from nlbench.errors import ConfigError, Problem
-from nlbench.plugins import trouble
 from nlbench.plugins.plugin import Kind, Plugin
 from nlbench.plugins.signature import entry_of
 
@@ -64,7 +64,7 @@ def _loaded(kind: Kind, name: str, point: EntryPoint) -> Plugin:
     try:
         factory = point.load()
     except (Exception, SystemExit) as error:
-        raise ConfigError([trouble.located(error, where, "importing it failed")]) from None
+        raise ConfigError([locate_step(error, where, "importing it failed")]) from None
     entry = {name: entry_of(factory, kind, name, where)}
     systems, filters = (entry, {}) if kind == "systems" else ({}, entry)
     return Plugin(

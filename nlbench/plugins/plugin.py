@@ -7,8 +7,8 @@ from typing import Any, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
+from nlbench.blame import locate_step
 from nlbench.errors import ConfigError, NlbenchError
-from nlbench.plugins import trouble
 
 Kind = Literal["systems", "filters"]
 
@@ -58,7 +58,7 @@ def made(plugin: Plugin, what: str, entry: Entry, *arguments: Any) -> Any:
     except NlbenchError:
         raise
     except Exception as error:
-        raise ConfigError([trouble.located(error, plugin.path, f"{what}: making it failed")]) from None
+        raise ConfigError([locate_step(error, plugin.path, f"{what}: making it failed")]) from None
 
 
 def stand_in(spec: Any) -> Plugin:

@@ -31,7 +31,7 @@ class DiscreteSystem(ErrorRules):
     and state-dependent noise, G(x) w, are special cases. Shapes are those of one trajectory: n states, m measurements,
     s process noises, q measurement noises.
 
-    transition: (k, x, w) -> (n,). observe: (k, x, v) -> (m,).
+    transition: (k, x, w) -> (n,). observe: (k, x, v) -> (m,). A number stands for a vector or a matrix of one entry.
     process_cov: (s, s), the covariance Q of w. measurement_cov: (q, q), the covariance R of v.
     initial: moments at step 0 that the filters start from, and that `sample` defaults to (normal).
     truth: another system that makes the data, when truth and filter model differ.
@@ -55,6 +55,10 @@ class DiscreteSystem(ErrorRules):
     inputs: Function | None = None
     interval: int | None = 1
     exact: Any = None
+
+    def __post_init__(self) -> None:
+        functions = {"transition": 1, "observe": 1, "residual": 1, "error": 1, "sample": 1}
+        self._accept(functions, ("process_cov", "measurement_cov"))
 
     @property
     def states(self) -> int:

@@ -112,6 +112,20 @@ class ErrorRules:
     clip: tuple[float, ...] | None = None
     norms: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
+    def _accept(self, functions: dict[str, int], matrices: tuple[str, ...]) -> None:
+        """Take numbers for matrices and vectors of one entry, and integers for floats: in the results of functions, by
+        their rank, in matrices and in the initial moments."""
+        from nlbench.shapes import as_floats, as_rank
+
+        taken = {name: as_floats(getattr(self, name), rank) for name, rank in functions.items()}
+        taken |= {name: as_rank(getattr(self, name), 2) for name in matrices}
+        initial: Any = getattr(self, "initial", None)
+        if hasattr(initial, "_replace"):
+            mean, cov = as_rank(initial.mean, 1), as_rank(initial.cov, 2)
+            taken["initial"] = initial._replace(mean=mean, cov=cov)
+        for name, value in taken.items():
+            object.__setattr__(self, name, value)
+
 
 @dataclass(frozen=True)
 class System(ErrorRules):
@@ -119,7 +133,7 @@ class System(ErrorRules):
 
     Shapes are those of one trajectory: n states, m measurements, s noises.
 
-    drift: (t, x) -> (n,), or a tuple of n scalars.
+    drift: (t, x) -> (n,), or a tuple of n scalars. A number stands for a vector or a matrix of one entry throughout.
     observe: (t, x) -> (m,), or a tuple of m scalars.
     measurement_cov: (m, m), the covariance R of a sample, or the spectral density Gamma when `measurement` is
         "continuous".
@@ -155,6 +169,10 @@ class System(ErrorRules):
     sampling: Sampling | None = None
     sightings: Sightings | None = None
     exact: Any = None
+
+    def __post_init__(self) -> None:
+        functions = {"drift": 1, "observe": 1, "diffusion": 2, "residual": 1, "error": 1, "sample": 1}
+        self._accept(functions, ("measurement_cov", "diffusion_cov"))
 
     @property
     def states(self) -> int:

@@ -127,7 +127,7 @@ def test_a_model_with_the_other_kind_of_measurements_is_refused(tmp_path):
 
 
 def test_a_filter_has_the_steps_of_the_run(tmp_path):
-    with pytest.raises(ConfigError, match=r"kushner-3.step.*time.step"):
+    with pytest.raises(ConfigError, match=r"filters\.0\.step.*time\.step"):
         run(tmp_path, [{"name": "kushner-3", "step": 0.005}])
 
 

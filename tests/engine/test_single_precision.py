@@ -80,7 +80,7 @@ def test_what_float64_has_not_either_is_not_lost_and_what_it_has_is():
             drift=lambda t, x: -x, observe=observe, measurement_cov=np.eye(1), initial=mean, interval=1.0
         )
 
-    checked(seen(lambda t, x: jnp.arctan2(x[:1], 0 * x[1:])))
+    checked(seen(lambda t, x: jnp.arctan2(x[:1], 0 * x[1:])), "ukf")
     with pytest.raises(ConfigError, match="observe: values in float32 are lost"):
         checked(seen(lambda t, x: jnp.exp(100 + x[:1])))
 

@@ -128,8 +128,10 @@ def test_without_a_guard_nothing_is_counted():
 
 @pytest.mark.parametrize("name", GUARDED)
 def test_a_state_that_is_lost_already_is_not_counted_as_guarded(name):
-    system = linear_measurement([np.nan], np.eye(1), np.eye(1), np.eye(1), [[[0.1]]])
-    assert not bool(updated(name, system, np.ones(1))[1].guarded)
+    system = linear_measurement([0.0], np.eye(1), np.eye(1), np.eye(1), [[[0.1]]])
+    f = nb.filters.build(name, system)
+    lost = f.init(system.initial._replace(mean=np.array([np.nan])))
+    assert not bool(f.update(lost, 0.0, np.ones(1))[1].guarded)
 
 
 def two_measurements(seed=0):
