@@ -32,6 +32,13 @@ def as_rank(array: Any, rank: int) -> Any:
     return array.reshape((1,) * rank) if array.size == 1 and array.ndim < rank else array
 
 
+def as_moments(moments: Any) -> Any:
+    """Return moments with numbers as arrays, as `as_rank` does; what are no moments stays."""
+    if not hasattr(moments, "_fields"):
+        return moments
+    return type(moments)(*(as_rank(part, rank) for rank, part in enumerate(moments, 1)))
+
+
 @dataclass(frozen=True)
 class Floats:
     """A function of a system whose result is an array of floats of a rank; such an array itself is left as it is."""

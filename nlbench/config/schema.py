@@ -124,7 +124,9 @@ class Initial(Section):
     """Initial moments; a variance is short for a diagonal covariance."""
 
     mean: Finite | list[Finite] | None = Field(default=None, description="of the state")
-    cov: list[list[Finite]] | None = Field(default=None, description="covariance, symmetric, as rows")
+    cov: Finite | list[list[Finite]] | None = Field(
+        default=None, description="covariance, symmetric, as rows; a number for one state"
+    )
     variance: NotNegative | list[NotNegative] | None = Field(
         default=None, description="the diagonal of the covariance, instead of it"
     )
@@ -157,7 +159,7 @@ class Initial(Section):
         if self.mean is not None:
             moments["mean"] = self.mean if isinstance(self.mean, list) else [self.mean]
         if self.cov is not None:
-            moments["cov"] = self.cov
+            moments["cov"] = self.cov if isinstance(self.cov, list) else [[self.cov]]
         elif self.variance is not None:
             diagonal = self.variance if isinstance(self.variance, list) else [self.variance]
             moments["cov"] = [

@@ -27,6 +27,7 @@ def build(name: str, system: System | DiscreteSystem, **options: Any) -> Filter:
     from nlbench.errors import ConfigError
     from nlbench.filters.derivatives import refuse_singular
     from nlbench.runtime import ensure_precision
+    from nlbench.shapes import as_moments
     from nlbench.systems.system import kind
 
     of = kind(system)
@@ -44,7 +45,8 @@ def build(name: str, system: System | DiscreteSystem, **options: Any) -> Filter:
     else:
         bound = _builder(found.family)(name, found, system, chosen)
     step = 1.0 if of.discrete else getattr(chosen, "step", None) or getattr(system, "default_step", None)
-    bound = bound._replace(step=step)
+    start = bound.init
+    bound = bound._replace(step=step, init=lambda moments, key=None: start(as_moments(moments), key))
     refuse_singular(name, found, chosen, bound)
     return bound
 

@@ -115,14 +115,11 @@ class ErrorRules:
     def _accept(self, functions: dict[str, int], matrices: tuple[str, ...]) -> None:
         """Take numbers for matrices and vectors of one entry, and integers for floats: in the results of functions, by
         their rank, in matrices and in the initial moments."""
-        from nlbench.shapes import as_floats, as_rank
+        from nlbench.shapes import as_floats, as_moments, as_rank
 
         taken = {name: as_floats(getattr(self, name), rank) for name, rank in functions.items()}
         taken |= {name: as_rank(getattr(self, name), 2) for name in matrices}
-        initial: Any = getattr(self, "initial", None)
-        if hasattr(initial, "_replace"):
-            mean, cov = as_rank(initial.mean, 1), as_rank(initial.cov, 2)
-            taken["initial"] = initial._replace(mean=mean, cov=cov)
+        taken["initial"] = as_moments(getattr(self, "initial", None))
         for name, value in taken.items():
             object.__setattr__(self, name, value)
 

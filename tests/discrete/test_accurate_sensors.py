@@ -158,6 +158,22 @@ def test_a_start_that_is_known_exactly_is_kept(name):
     np.testing.assert_allclose(covs, known_covs, rtol=1e-8, atol=1e-10)
 
 
+@pytest.mark.parametrize("propagation", ["transition", "moments"])
+@pytest.mark.parametrize("name", ["ekf", "ukf", "statistical-linearisation"])
+def test_a_car_with_a_wide_prior_and_an_accurate_sensor_is_followed(name, propagation):
+    """With constant velocity a Runge-Kutta step is exact for moments too, whose stages are no covariances here."""
+    (means, covs, _), (known_means, known_covs) = driven(
+        name, car(), 0.01, (100.0, 400.0), count=8, propagation=propagation
+    )
+    np.testing.assert_allclose(means, known_means, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(covs, known_covs, rtol=1e-7, atol=1e-10)
+
+
+def test_a_transition_makes_steps_of_its_own():
+    with pytest.raises(nb.errors.ConfigError, match="transition makes steps of rk4: leave integrator out"):
+        nb.filters.build("ekf", car(), propagation="transition", integrator={"solver": "Tsit5"})
+
+
 @pytest.mark.parametrize(
     "name", ["ekf", "ukf", "sof", "iekf", "truncated", "statistical-linearisation", "gaussian-sum"]
 )

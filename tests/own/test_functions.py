@@ -105,6 +105,14 @@ def test_a_number_is_a_matrix_of_one_entry(name):
             assert equal(followed(name, numbers), followed(name, arrays))
 
 
+@pytest.mark.parametrize("name", ["ekf", "ukf", "third-order", "bootstrap"])
+def test_a_filter_starts_from_numbers_too(name):
+    f = filters.build(name, one())
+    key = jax.random.key(0)
+    numbers, arrays = f.init(nb.Moments(1, 4), key), f.init(nb.Moments(np.ones(1), np.full((1, 1), 4.0)), key)
+    assert all((a == b).all() for a, b in zip(*map(jax.tree.leaves, (numbers, arrays)), strict=True))
+
+
 def test_one_noise_may_come_as_a_vector():
     column = two(diffusion=lambda t, x: jnp.array([[0.0], [1.0]]))
     assert equal(followed("ekf", two(diffusion=lambda t, x: jnp.array([0.0, 1.0]))), followed("ekf", column))
@@ -273,6 +281,12 @@ def test_an_error_in_a_function_that_a_function_calls_is_at_its_line():
     (problem,) = complaints(two(drift=lambda t, x: helper(x)))
     assert problem.line == helper.__code__.co_firstlineno + 1
     assert problem.message.endswith("write jnp.linalg.norm")
+
+
+def test_what_no_line_of_the_users_raises_is_where_the_function_begins():
+    function = lambda t, x: {"position": x}  # noqa: E731
+    (problem,) = complaints(two(drift=function))
+    assert (Path(problem.file).name, problem.line) == (HERE, function.__code__.co_firstlineno)
 
 
 @pytest.mark.parametrize(
