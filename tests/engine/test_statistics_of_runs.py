@@ -142,11 +142,10 @@ EXPLODING = {
 
 
 def test_a_covariance_that_was_beyond_all_sense_before_a_measurement_is_a_divergence_for_good():
-    """Run 21,097 explodes just before t = 1; rounding leaves a mean and a variance of zero, near the truth by luck."""
+    """Run 21,097 explodes just before t = 1; what the measurement makes of it is rounding, near the truth or not."""
     compiled = compile_chunks(make(experiment(**EXPLODING)), 411)
     block, lane = divmod(21_097, 64)
     view, sums = compiled.view(21_097), compiled.sums(block, 1, 40_000)
-    assert abs(view.error[0][10, 0]) < 1.0  # of the mean stated, after the measurement
     assert view.diverged[0][10:].all()
     assert not view.diverged[0][:9].any()
     assert sums["report_lost"][0, 0, :, lane].tolist() == [False, True, True]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 
 import jax
@@ -96,15 +97,16 @@ def test_every_wrong_shape_is_named_with_what_was_expected():
         observe=lambda t, x: x,
         measurement_cov=np.eye(1),
         initial=nb.Moments(np.zeros(2), np.eye(3)),
-        diffusion=lambda t, x: np.ones(2),
+        diffusion=lambda t, x: np.ones((3, 1)),
     )
     with pytest.raises(ConfigError) as caught:
         nb.filters.build("ekf", system)
-    assert str(caught.value).splitlines() == [
+    here = "tests/runtime/test_configure.py:"
+    assert [re.sub(rf"^.*{here}\d+: ", "", line) for line in str(caught.value).splitlines()] == [
         "initial.cov: got shape (3, 3), expected (2, 2)",
         "drift(t, x): got shape (1,), expected (2,)",
         "observe(t, x): got shape (2,), expected (1,)",
-        "diffusion(t, x): got shape (2,), expected (2, any)",
+        "diffusion(t, x): got shape (3, 1), expected (2, any)",
     ]
 
 
