@@ -65,7 +65,7 @@ CURVED: dict[str, Callable[[Any], Callable[[Components, Seen], Outcome]]] = {
     "direct": lambda options: partial(direct, points=options.points),
     "quadrature": lambda options: partial(quadrature, points=options.points),
 }
-DENSITIES = ("direct", "quadrature")  # integrate over densities
+DENSITIES = ("quadrature",)  # integrate over densities at the mode
 
 
 def build(name: str, row: Row, system: System, options: Options) -> Filter:
