@@ -65,7 +65,6 @@ CURVED: dict[str, Callable[[Any], Callable[[Components, Seen], Outcome]]] = {
     "direct": lambda options: partial(direct, points=options.points),
     "quadrature": lambda options: partial(quadrature, points=options.points),
 }
-DENSITIES = ("quadrature",)  # integrate over densities at the mode
 
 
 def build(name: str, row: Row, system: System, options: Options) -> Filter:
@@ -188,8 +187,8 @@ def _curved_update(
     fired, safe = jnp.zeros((), bool), kalman(state, gained, seen.z, seen.z).moments
     safe = safe if row.order == 2 else fallback(state, gained, seen.z)
     if (
-        row.update in DENSITIES
-    ):  # moments that integration left without a density take Kalman's update, which is counted
+        row.update == "quadrature"
+    ):  # where there is no density to integrate, Kalman's update is taken, and counted
         sound = integrable(state, gained)
         moments, nu = either(sound, moments, safe), jnp.where(sound, nu, 0.0)
         fired = ~sound & jnp.isfinite(gained.S[0, 0])
